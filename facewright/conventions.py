@@ -1,0 +1,31 @@
+"""Axes, units, colour and names: the one place where Facewright's conventions are written as code.
+
+Millimetres, right-handed, +Y up, +Z out of the face, +X the person's left, origin midway between the eyes. Float64.
+UV: u to the right, v up (OBJ); row 0 of an image is v = 1. Albedo arrays are uint8 sRGB, data maps are linear,
+normal maps are +Y (OpenGL).
+"""
+
+ARKIT_SHAPES = tuple(
+    """eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft eyeWideLeft
+    eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight eyeSquintRight eyeWideRight
+    jawForward jawLeft jawRight jawOpen mouthClose mouthFunnel mouthPucker mouthLeft mouthRight
+    mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthDimpleLeft mouthDimpleRight
+    mouthStretchLeft mouthStretchRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper
+    mouthPressLeft mouthPressRight mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight
+    browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight
+    cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft noseSneerRight tongueOut""".split()
+)
+
+INTERPUPILLARY_MM = 63.0
+"""Mean adult distance between the pupils: the scale of a scan that states none, and of every benchmark figure."""
+
+MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4}
+
+
+def mirrored_name(shape):
+    """The shape's name on the other side of the face: mouthSmileLeft -> mouthSmileRight, jawOpen -> jawOpen."""
+    if shape.endswith("Left"):
+        return shape[:-4] + "Right"
+    if shape.endswith("Right"):
+        return shape[:-5] + "Left"
+    return shape

@@ -1,0 +1,113 @@
+"""Rays against a triangle mesh (Embree), and pictures made of them: orthographic views and UV-space rasters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+
+
+@dataclass(frozen=True)
+class Hits:
+    """face (k,) int, -1 where nothing was hit; barycentric (k, 3); distance (k,), inf where nothing was hit."""
+
+    face: np.ndarray
+    barycentric: np.ndarray
+    distance: np.ndarray
+
+
+class RayScene:
+    """A triangle mesh ready for rays. Embree works in float32: keep coordinates near the origin, in millimetres."""
+
+    def __init__(self, vertices, faces):
+        self._scene = rtcore_scene.EmbreeScene(robust=True)
+        triangles = np.ascontiguousarray(np.asarray(vertices)[np.asarray(faces)], dtype=np.float32)
+        TriangleMesh(self._scene, triangles)
+
+    def cast(self, origins, directions):
+        """First hits of rays: origins (k, 3), directions (k, 3) of any length (distances count in that length)."""
+        result = self._scene.run(
+            np.ascontiguousarray(origins, dtype=np.float32),
+            np.ascontiguousarray(directions, dtype=np.float32),
+            query="INTERSECT",
+            output=True,
+        )
+        face = result["primID"].astype(np.int64)
+        hit = face >= 0
+        u, v = result["u"].astype(np.float64), result["v"].astype(np.float64)
+        barycentric = np.where(hit[:, None], np.stack([1 - u - v, u, v], axis=1), 0.0)
+        distance = np.where(hit, result["tfar"].astype(np.float64), np.inf)
+        return Hits(face, barycentric, distance)
+
+    def occluded(self, origins, directions):
+        """(k,) bool: the ray hits anything."""
+        result = self._scene.run(
+            np.ascontiguousarray(origins, dtype=np.float32),
+            np.ascontiguousarray(directions, dtype=np.float32),
+            query="OCCLUDED",
+        )
+        return np.asarray(result) >= 0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An orthographic camera. R (3, 3) rows: right, up, backward (towards the viewer); center (3,) mm.
+
+    half_height  half of the visible height, mm
+    size         (height, width) in pixels
+    """
+
+    R: np.ndarray
+    center: np.ndarray
+    half_height: float
+    size: tuple[int, int]
+
+    @staticmethod
+    def looking_at(center, yaw_deg=0.0, pitch_deg=0.0, half_height=140.0, size=(640, 640)):
+        """yaw > 0 moves the camera to +X (the person's left), pitch > 0 above; 0, 0 looks at the face from the front."""
+        yaw, pitch = np.radians(yaw_deg), np.radians(pitch_deg)
+        backward = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
+        right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
+        up = np.cross(backward, right)
+        return Camera(np.stack([right, up, backward]), np.asarray(center, float), float(half_height), tuple(size))
+
+    def rays(self):
+        """origins, directions (h*w, 3), row by row from the top left."""
+        height, width = self.size
+        scale = 2 * self.half_height / height
+        x = (np.arange(width) - width / 2 + 0.5) * scale
+        y = -(np.arange(height) - height / 2 + 0.5) * scale
+        grid_x, grid_y = np.meshgrid(x, y)
+        offsets = grid_x.reshape(-1, 1) * self.R[0] + grid_y.reshape(-1, 1) * self.R[1]
+        origins = self.center + offsets + 1000.0 * self.R[2]
+        return origins, np.broadcast_to(-self.R[2], origins.shape)
+
+    def project(self, points):
+        """(k, 3) mm -> (k, 2) pixels (x right, y down) and (k,) height towards the viewer."""
+        local = (points - self.center) @ self.R.T
+        scale = self.size[0] / (2 * self.half_height)
+        pixels = np.stack([local[:, 0] * scale + self.size[1] / 2, -local[:, 1] * scale + self.size[0] / 2], axis=1)
+        return pixels, local[:, 2]
+
+
+def raster_uv(uv, uv_faces, size, chunk=1 << 20):
+    """Which triangle covers each texel of a (size, size) map in UV space.
+
+    returns face (size, size) int, -1 where none, and barycentric (size, size, 3); row 0 is v = 1
+    """
+    flat = np.column_stack([uv * 1000.0, np.zeros(len(uv))])
+    scene = RayScene(flat, uv_faces)
+    center = (np.arange(size) + 0.5) / size * 1000.0
+    face = np.empty(size * size, np.int64)
+    barycentric = np.empty((size * size, 3))
+    rows = max(1, chunk // size)
+    for start in range(0, size, rows):
+        stop = min(size, start + rows)
+        grid_u, grid_v = np.meshgrid(center, 1000.0 - center[start:stop])
+        origins = np.stack([grid_u.ravel(), grid_v.ravel(), np.full(grid_u.size, 10.0)], axis=1)
+        hits = scene.cast(origins, np.broadcast_to([0.0, 0.0, -1.0], origins.shape))
+        face[start * size : stop * size] = hits.face
+        barycentric[start * size : stop * size] = hits.barycentric
+    return face.reshape(size, size), barycentric.reshape(size, size, 3)
