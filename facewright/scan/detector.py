@@ -1,0 +1,121 @@
+"""MediaPipe's face landmarker on one picture, and its canonical face: the only module that knows MediaPipe.
+
+The model file lies beside this module with its notice (Apache-2.0). Nothing is downloaded.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import struct
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+MODEL_PATH = Path(__file__).with_name("face_landmarker.task")
+N_LANDMARKS = 478
+LANDMARK_NAMES = tuple(f"mp{i}" for i in range(N_LANDMARKS))
+
+# Outer and inner canthi in MediaPipe's numbering, the person's right eye first.
+CANTHI_RIGHT, CANTHI_LEFT = (33, 133), (263, 362)
+# Distance from the plane of the canthi back to the eyeballs' centres, mm at an inter-pupillary distance of 63 mm.
+CANTHI_TO_EYE_CENTRE_MM = 5.5
+
+
+@contextlib.contextmanager
+def _quiet_stderr():
+    """Point the process's stderr to nowhere: MediaPipe's C++ threads log start-up chatter that no flag turns off."""
+    sys.stderr.flush()
+    try:
+        saved = os.dup(2)
+    except OSError:  # no stderr at all, as under pythonw
+        yield
+        return
+    sink = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(sink)
+        os.close(saved)
+
+
+@functools.lru_cache(maxsize=1)
+def _landmarker():
+    """The network, loaded once a process, and its image class. About 0.4 s after an import of about 1 s."""
+    with _quiet_stderr():
+        import mediapipe
+
+        vision = mediapipe.tasks.vision
+        options = vision.FaceLandmarkerOptions(
+            base_options=mediapipe.tasks.BaseOptions(model_asset_buffer=MODEL_PATH.read_bytes()),
+            num_faces=1,
+            min_face_detection_confidence=0.3,
+            min_face_presence_confidence=0.3,
+        )
+        landmarker = vision.FaceLandmarker.create_from_options(options)
+        # The first picture draws the rest of the chatter.
+        blank = np.zeros((64, 64, 3), np.uint8)
+        landmarker.detect(mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=blank))
+    return landmarker, functools.partial(mediapipe.Image, image_format=mediapipe.ImageFormat.SRGB)
+
+
+def detect_landmarks(image):
+    """The most prominent face in a picture (h, w, 3) uint8 sRGB.
+
+    returns (478, 2) pixels (x right, y down, pixel centres at .5), or None where no face is seen
+    """
+    landmarker, as_image = _landmarker()
+    height, width = image.shape[:2]
+    found = landmarker.detect(as_image(data=np.ascontiguousarray(image))).face_landmarks
+    if not found:
+        return None
+    pixels = np.array([(point.x, point.y) for point in found[0]])
+    return pixels * [width, height]
+
+
+def _protobuf_fields(message):
+    """(field number, value) pairs of a protobuf message: ints, float32s and bytes."""
+
+    def varint(at):
+        value = shift = 0
+        while True:
+            byte = message[at]
+            value |= (byte & 127) << shift
+            shift, at = shift + 7, at + 1
+            if byte < 128:
+                return value, at
+
+    at = 0
+    while at < len(message):
+        key, at = varint(at)
+        if key & 7 == 0:
+            value, at = varint(at)
+        elif key & 7 == 5:
+            value, at = struct.unpack_from("<f", message, at)[0], at + 4
+        else:
+            size, at = varint(at)
+            value, at = message[at : at + size], at + size
+        yield key >> 3, value
+
+
+@functools.lru_cache(maxsize=1)
+def canonical_landmarks():
+    """(468, 3) MediaPipe's canonical face in our frame: mm, 63 mm between the eyes, origin between the eyeballs.
+
+    The eyes are taken midway between their canthi. The irises (468..477) are no part of it.
+    """
+    with zipfile.ZipFile(MODEL_PATH) as bundle:
+        metadata = bundle.read("geometry_pipeline_metadata_landmarks.binarypb")
+    mesh = dict(_protobuf_fields(metadata))[1]
+    buffer = np.array([value for number, value in _protobuf_fields(mesh) if number == 3])
+    points = buffer.reshape(-1, 5)[:, :3]  # position and texture coordinates, interleaved
+    right, left = points[list(CANTHI_RIGHT)].mean(axis=0), points[list(CANTHI_LEFT)].mean(axis=0)
+    points = (points - (right + left) / 2) * (63.0 / np.linalg.norm(left - right))
+    points[:, 2] += CANTHI_TO_EYE_CENTRE_MM
+    points.flags.writeable = False
+    return points
