@@ -16,21 +16,15 @@ import json
 from pathlib import Path
 
 import numpy as np
+from common import camera_of, file_vertices
 from PIL import Image, ImageDraw
 
 from facewright.mesh.closest import interpolate
-from facewright.mesh.raster import Camera, RayScene
+from facewright.mesh.raster import RayScene
 from facewright.mesh.render import render
 from facewright.read import read_scan
 
 GRID_PX = 50
-
-
-def camera_of(view):
-    """The orthographic camera of a view, in millimetres of the scan file's own axes."""
-    height, width = view["size"]
-    half_height = height * view["mm_per_px"] / 2
-    return Camera.looking_at(view["center"], view.get("yaw", 0), view.get("pitch", 0), half_height, (height, width))
 
 
 def draw_grid(image):
@@ -44,12 +38,6 @@ def draw_grid(image):
         draw.line([(0, y), (picture.width, y)], fill=(255, 255, 255, 90 if y % 100 == 0 else 40))
         draw.text((2, y + 2), str(y), fill=(255, 255, 0, 255))
     return picture
-
-
-def file_vertices(scan):
-    """Vertices as the file has them: (n, 3) in file units."""
-    T = scan.T_ours_to_scan
-    return scan.vertices @ T[:3, :3].T + T[:3, 3]
 
 
 def draw_marks(picture, picking, name):
@@ -73,7 +61,7 @@ def write_views(scan, spec, folder, marks):
         for name, view in picking["views"].items():
             looks = {}
             if view.get("textured") and scan.has_texture:
-                looks = dict(texture=scan.textures[0], uv=scan.uv, uv_faces=scan.uv_faces)
+                looks = {"texture": scan.textures[0], "uv": scan.uv, "uv_faces": scan.uv_faces}
             picture = draw_grid(render(vertices, scan.faces, camera_of(view), **looks))
             if marks:
                 picture = draw_marks(picture, picking, name)
