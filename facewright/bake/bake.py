@@ -1,0 +1,234 @@
+"""Albedo, normal and coverage maps in the template's layout, baked from a scan through a fitted head.
+
+Texels of the outer skin look at the scan from face.fit, the surface that lies on it. Inner mouth, eye sockets, nostril
+insides and what the scan does not show are filled (bake/fill.py). Light that is baked into a scan's colours stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facewright.bake.fill import feather, solve_fill
+from facewright.bake.mirror import mirrored_corner_uv
+from facewright.bake.project import project_to_scan
+from facewright.bake.pyramid import push_pull
+from facewright.bake.sample import ScanLooks, sample_pixels
+from facewright.bake.texels import (
+    at_corners,
+    at_points,
+    build_texels,
+    gather_at_vertices,
+    in_chunks,
+    texel_densities,
+)
+from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.render import linear_to_srgb
+from facewright.mesh.tangents import corner_tangents, to_tangent_space
+
+SEEN, FILLED, INSIDE = 255, 128, 0
+DEFAULT_SKIN = (0.60, 0.42, 0.34)
+
+
+@dataclass(frozen=True)
+class BakeOptions:
+    """size             side of the square maps in texels
+    max_distance_mm  how far the scan may lie from the fit to be seen; less where the fit is close
+    """
+
+    size: int = 2048
+    max_distance_mm: float = 3.0
+
+
+@dataclass(frozen=True)
+class _Skin:
+    """The skin part of a face: V (n, 3) fit, F (m, 3), UV (t, 2), FT (m, 3), outer_faces (m,), observed (n,)."""
+
+    V: np.ndarray
+    neutral: np.ndarray
+    F: np.ndarray
+    UV: np.ndarray
+    FT: np.ndarray
+    outer_faces: np.ndarray
+    outer: np.ndarray
+    observed: np.ndarray
+
+
+def bake(scan, face, options=None, jobs=1):
+    """Maps of the scan's looks in the layout of the face's template.
+
+    scan     data.Scan in our frame: textured, with vertex colours, or clay
+    face     data.Face whose fit lies on the scan
+    options  BakeOptions; jobs is the number of threads, which changes no texel
+    returns  dict of (size, size, ...) uint8, row 0 at v = 1:
+             albedo (3 channels) sRGB, the scan's colours as they are; normal (3) linear, tangent space, +Y, frame by
+             MikkTSpace on face.fit with area-weighted vertex normals; coverage 255 seen by the scan, 128 filled from
+             the other side or the surroundings, 0 inside (mouth, sockets, nostrils) and outside the charts
+    """
+    options = options or BakeOptions()
+    skin = _skin_of(face)
+    texels = build_texels(skin.UV, skin.FT, options.size, jobs)
+    can_see = skin.outer_faces[texels.face]
+    wanted = can_see & _observed(skin, texels, jobs)
+    rays = vertex_normals(skin.V, skin.F[skin.outer_faces])
+    hits = project_to_scan(scan, skin.V, skin.F, rays, texels, wanted, options.max_distance_mm, jobs)
+    colors, colored, bends, met = _look(scan, skin, texels, hits, options.size, jobs)
+
+    geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
+    geometry_weight = feather(skin.V, skin.F, skin.outer, geometry_share)
+    has_color = bool(colored.any())
+    means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, len(skin.V), jobs)
+    n = len(skin.V)
+    regions = {name: mask[:n] for name, mask in face.regions.items()}
+    default = _default_skin(face.template)
+    fill = solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, share, default)
+
+    albedo = _compose_albedo(face.template, skin, texels, colors, colored, fill, jobs)
+    normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
+    weight = fill.weight if has_color else geometry_weight
+    coverage = _coverage(skin, texels, colored if has_color else met, weight, can_see, jobs)
+    return {"albedo": albedo, "normal": normal, "coverage": coverage}
+
+
+def describe_maps(face, maps):
+    """dict of numbers for a manifest: size, texel density in region `face` (texels per mm), shares of the skin."""
+    skin = _skin_of(face)
+    size = maps["albedo"].shape[0]
+    density = texel_densities(skin.neutral, skin.F, skin.UV, skin.FT, size)
+    front = face.regions["face"][skin.F].all(axis=1) if "face" in face.regions else skin.outer_faces
+    coverage = maps["coverage"]
+    return {
+        "size": size,
+        "texels_per_mm_face_median": round(float(np.median(density[front])), 3) if front.any() else None,
+        "texels_per_mm_face_p5": round(float(np.percentile(density[front], 5)), 3) if front.any() else None,
+        "outer_skin_seen_share": round(float((coverage == SEEN).sum() / max((coverage > 0).sum(), 1)), 4),
+    }
+
+
+def _skin_of(face):
+    template = face.template
+    n = template.skin.vertices[1]
+    F = template.faces[template.skin.face_slice]
+    mask = face.regions["outer"][:n]
+    outer_faces = mask[F].all(axis=1)
+    outer = np.zeros(n, bool)
+    outer[F[outer_faces].ravel()] = True
+    FT = template.uv_faces[template.skin.face_slice]
+    return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, face.observed[:n])
+
+
+def _default_skin(template):
+    """(3,) sRGB 0..255: the colour of the skin's material."""
+    material = template.materials.get(template.skin.material, {})
+    return linear_to_srgb(np.array(material.get("color", DEFAULT_SKIN), float)) * 255.0
+
+
+def _observed(skin, texels, jobs):
+    """(k,) bool: the fit follows the scan at the texel."""
+    observed = skin.observed.astype(np.float32)
+
+    def work(piece):
+        return at_points(observed, skin.F, texels.face[piece], texels.barycentric[piece]) >= 0.5
+
+    return _joined(in_chunks(work, len(texels), jobs), (0,), bool)
+
+
+def _look(scan, skin, texels, hits, size, jobs):
+    """What the texels see: colours (k, 3) float32, colored (k,), x and y of tangent-space normals (k, 2), met (k,)."""
+    looks = ScanLooks(scan)
+    texel_mm = (1.0 / np.maximum(texel_densities(skin.V, skin.F, skin.UV, skin.FT, size), 1e-6)).astype(np.float32)
+    normals = vertex_normals(skin.V, skin.F)
+    tangents, signs = corner_tangents(skin.V, skin.F, normals, skin.UV, skin.FT)
+    tangents, signs = tangents.astype(np.float32), signs.astype(np.float32)
+    k = len(texels)
+    colors, colored = np.zeros((k, 3), np.float32), np.zeros(k, bool)
+    bends, met = np.zeros((k, 2), np.float32), hits.face >= 0
+    seen = np.flatnonzero(met)
+
+    def work(piece):
+        at = seen[piece]
+        face, barycentric, on_scan = texels.face[at], texels.barycentric[at], hits.face[at]
+        spacing = texel_mm[face]
+        colors[at], colored[at] = looks.colors(on_scan, hits.barycentric[at], spacing)
+        normal = normalized(at_points(normals, skin.F, face, barycentric))
+        tangent = normalized(at_corners(tangents, face, barycentric))
+        direction = looks.normals(on_scan, hits.barycentric[at], spacing)
+        bend = to_tangent_space(direction, normal, tangent, signs[face])
+        bend[:, 2] = np.maximum(bend[:, 2], 0.1)  # a normal map cannot turn a surface away from the viewer
+        bends[at] = normalized(bend)[:, :2]
+
+    in_chunks(work, len(seen), jobs)
+    return colors, colored, bends, met
+
+
+def _compose_albedo(template, skin, texels, colors, colored, fill, jobs):
+    """(size, size, 3) uint8: the scan's colours, the fill where it has none, gutters."""
+    seen = _spread(texels, colors, colored)
+    corner_uv = mirrored_corner_uv(skin.F, template.polygons, template.uv_polygons, template.uv, template.mirror)
+    mirrored_face = np.isfinite(corner_uv).all(axis=(1, 2))
+    size = texels.size
+    result = np.empty((len(texels), 3), np.float32)
+
+    def work(piece):
+        face, barycentric = texels.face[piece], texels.barycentric[piece]
+        weight = at_points(fill.weight, skin.F, face, barycentric)[:, None]
+        own = seen[texels.index[piece]]
+        filled = at_points(fill.color, skin.F, face, barycentric)
+        detail = at_points(fill.detail, skin.F, face, barycentric)
+        at = np.flatnonzero((detail > 0) & (weight[:, 0] < 1) & mirrored_face[face])
+        uv = at_corners(corner_uv, face[at], barycentric[at])
+        other = sample_pixels(seen.reshape(size, size, 3), uv.astype(np.float64) * size)
+        other -= at_points(fill.mirrored, skin.F, face[at], barycentric[at])
+        filled[at] += detail[at, None] * other
+        result[piece] = own * weight + filled * (1 - weight)
+
+    in_chunks(work, len(texels), jobs)
+    image = _spread(texels, result, np.ones(len(texels), bool))
+    return _bytes(image).reshape(size, size, 3)
+
+
+def _compose_normal(skin, texels, bends, met, weight, jobs):
+    """(size, size, 3) uint8: tangent-space normals, flat where the scan shows nothing."""
+    seen = _spread(texels, bends, met)
+    result = np.empty((len(texels), 2), np.float32)
+
+    def work(piece):
+        share = at_points(weight, skin.F, texels.face[piece], texels.barycentric[piece])
+        result[piece] = seen[texels.index[piece]] * share[:, None]
+
+    in_chunks(work, len(texels), jobs)
+    xy = _spread(texels, result, np.ones(len(texels), bool))
+    z = np.sqrt(np.maximum(1.0 - (xy * xy).sum(1, keepdims=True), 0.0))
+    return _bytes(np.concatenate([xy, z], axis=1) * 127.0 + 128.0).reshape(texels.size, texels.size, 3)
+
+
+def _coverage(skin, texels, seen, weight, can_see, jobs):
+    """(size, size) uint8 of SEEN, FILLED and INSIDE."""
+    result = np.full(texels.size**2, INSIDE, np.uint8)
+
+    def work(piece):
+        share = at_points(weight, skin.F, texels.face[piece], texels.barycentric[piece])
+        direct = seen[piece] & (share > 0.5)
+        result[texels.index[piece]] = np.where(direct, SEEN, np.where(can_see[piece], FILLED, INSIDE))
+
+    in_chunks(work, len(texels), jobs)
+    return result.reshape(texels.size, texels.size)
+
+
+def _spread(texels, values, valid):
+    """(size * size, c) float32: values (k, c) of the valid texels at their places, every other place filled in."""
+    size, channels = texels.size, values.shape[1]
+    image = np.zeros((size * size, channels), np.float32)
+    weights = np.zeros(size * size, np.float32)
+    at = texels.index[valid]
+    image[at], weights[at] = values[valid], 1.0
+    return push_pull(image.reshape(size, size, channels), weights.reshape(size, size)).reshape(-1, channels)
+
+
+def _bytes(image):
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def _joined(parts, empty_shape, dtype):
+    return np.concatenate(parts) if parts else np.empty(empty_shape, dtype)

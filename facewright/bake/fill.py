@@ -1,0 +1,131 @@
+"""What the scan does not show: colours for the rest of the head, solved on its surface.
+
+A low-pass colour x per vertex is known where the scan shows the skin. Elsewhere it minimises
+
+    sum_edges w_ij |(x_i - x_j) - (g_i - g_j)|^2
+
+where g is the mirrored colour if the other side is known at both ends, else 0: a missing cheek repeats the other one's
+shading without a step at its border, and what neither side shows is a smooth membrane (Perez, Gangnet and Blake 2003,
+on a mesh instead of an image). The mirrored side's detail is added texel by texel. Work in sRGB: steps that the eye
+sees as equal count as equal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import dijkstra
+
+from facewright.mesh.adjacency import dilate, unique_edges
+from facewright.solve.quadratic import Factorization
+
+TRUSTED_MM = 2.0
+FEATHER_MM = 5.0
+SHOWN_SHARE = 0.5
+RIDGE = 1e-6
+# Multiplies the mean skin colour (sRGB): what is found this many mm behind the rim.
+INTERIORS = {
+    "mouth_interior": ((0.42, 0.20, 0.22), 6.0),
+    "socket_left": ((0.72, 0.50, 0.50), 3.0),
+    "socket_right": ((0.72, 0.50, 0.50), 3.0),
+    "nostrils": ((0.38, 0.26, 0.25), 5.0),
+}
+
+
+@dataclass(frozen=True)
+class Fill:
+    """color (n, 3) sRGB 0..255 of every vertex, low-pass; weight (n,) 0..1 of what the scan shows, feathered;
+    detail (n,) 0..1 weight of the mirrored side's detail; mirrored (n, 3) low-pass colour of the mirrored side, which
+    that detail is measured from.
+    """
+
+    color: np.ndarray
+    weight: np.ndarray
+    detail: np.ndarray
+    mirrored: np.ndarray
+
+
+def surface_distance(V, F, sources, limit):
+    """(n,) mm along edges from the nearest source vertex (n,) bool; limit where it is farther or there is none."""
+    if not sources.any():
+        return np.full(len(V), float(limit))
+    distance = dijkstra(
+        _length_graph(V, F), directed=False, indices=np.flatnonzero(sources), min_only=True, limit=limit
+    )
+    return np.minimum(distance, limit)
+
+
+def feather(V, F, outer, share):
+    """(n,) weight of what the scan shows: 1 inside, falling to 0 over 5 mm towards holes of the scan.
+
+    outer (n,) bool: vertices that can be seen; share (n,) of the texels around a vertex that met the scan, NaN where
+    it has none. The rims of mouth, lids and nostrils are no holes: there the scan's colour is kept to the last texel.
+    """
+    holes = outer & (share < SHOWN_SHARE)
+    distance = surface_distance(V, F, holes, FEATHER_MM)
+    t = np.clip((distance - 1.0) / (FEATHER_MM - 1.0), 0.0, 1.0)
+    return np.where(outer & ~holes, t * t * (3 - 2 * t), 0.0)
+
+
+def solve_fill(V, F, regions, mirror, outer, means, share, default):
+    """The Fill of a head.
+
+    V (n, 3) neutral, F (m, 3) skin; regions name -> (n,) bool; mirror (n,); outer (n,) bool
+    means (n, 3) sRGB around each vertex and share (n,) of its texels that met the scan (texels.gather_at_vertices)
+    default (3,) sRGB, the skin's colour where the scan has none at all
+    """
+    n = len(V)
+    weight = feather(V, F, outer, share)
+    holes = outer & (share < SHOWN_SHARE)
+    known = outer & (share >= SHOWN_SHARE) & (surface_distance(V, F, holes, TRUSTED_MM) >= TRUSTED_MM)
+    skin = np.median(means[known], axis=0) if known.any() else np.asarray(default, float)
+    color = np.where(known[:, None], means, skin)
+
+    twin_known = known[mirror] & outer
+    guide = np.where(twin_known[:, None], means[mirror], 0.0)
+    fixed = known.copy()
+    inside = surface_distance(V, F, outer, 20.0)
+    for name, (tone, depth) in INTERIORS.items():
+        deep = regions.get(name, np.zeros(n, bool)) & ~outer & (inside >= depth)
+        color[deep] = skin * tone
+        fixed |= deep
+    color = _poisson(V, F, color, fixed, guide, twin_known, skin)
+    # No detail on faces that touch an unknown twin: an edge may be longer than the ramp.
+    unknown = dilate(outer & ~twin_known, F)
+    detail = np.where(outer, np.clip(surface_distance(V, F, unknown, FEATHER_MM) / FEATHER_MM, 0.0, 1.0), 0.0)
+    return Fill(color, weight, detail, color[mirror])
+
+
+def _poisson(V, F, color, fixed, guide, guided, rest):
+    """Solve for the colours (n, 3) of the vertices that are not fixed; rest (3,) where nothing at all is known."""
+    n = len(V)
+    edges = unique_edges(F)
+    length = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1)
+    # 1 / length makes a membrane on meshes of uneven density; cotangents go negative at slivers.
+    weights = 1.0 / np.maximum(length, 1e-3)
+    gradient = sp.coo_matrix(
+        (np.repeat([[1.0, -1.0]], len(edges), axis=0).ravel(), (np.repeat(np.arange(len(edges)), 2), edges.ravel())),
+        shape=(len(edges), n),
+    ).tocsr()
+    both = guided[edges].all(1)
+    wanted = np.where(both[:, None], guide[edges[:, 0]] - guide[edges[:, 1]], 0.0)
+    A = (gradient.T @ sp.diags(weights) @ gradient).tocsr()
+    b = gradient.T @ (weights[:, None] * wanted)
+    free = np.flatnonzero(~fixed)
+    held = np.flatnonzero(fixed)
+    result = color.copy()
+    if len(free):
+        ridge = RIDGE * weights.mean()
+        system = A[free][:, free] + ridge * sp.identity(len(free))
+        right = b[free] - A[free][:, held] @ color[held] + ridge * rest
+        result[free] = Factorization(system).solve(right)
+    return np.clip(result, 0.0, 255.0)
+
+
+def _length_graph(V, F):
+    """(n, n) csr of edge lengths in mm."""
+    edges = unique_edges(F)
+    length = np.maximum(np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1), 1e-6)
+    return sp.coo_matrix((length, (edges[:, 0], edges[:, 1])), shape=(len(V), len(V))).tocsr()
