@@ -74,10 +74,10 @@ def render(vertices, faces, camera, *, colors=None, texture=None, uv=None, uv_fa
 
 
 def render_with_hits(
-    vertices, faces, camera, *, colors=None, texture=None, uv=None, uv_faces=None, normals=None, unlit=False
+    vertices, faces, camera, *, colors=None, texture=None, uv=None, uv_faces=None, normals=None, unlit=False, hits=None
 ):
-    """As render, and the Hits of the camera's rays, row by row."""
-    hits = RayScene(vertices, faces).cast(*camera.rays())
+    """As render, and the Hits of the camera's rays, row by row. hits, if known already, are not cast again."""
+    hits = RayScene(vertices, faces).cast(*camera.rays()) if hits is None else hits
     seen = hits.face >= 0
     face, barycentric = hits.face[seen], hits.barycentric[seen]
     normals = vertex_normals(vertices, faces) if normals is None else normals
