@@ -138,8 +138,8 @@ def topology_id(template):
     return f"{template.info.get('name', 'template')}-{digest.hexdigest()[:12]}"
 
 
-def npz_bytes(arrays):
-    """The bytes of an .npz of a dict of arrays: compressed, sorted by name, without time stamps or pickles."""
+def npz_bytes(arrays, level=7):
+    """The bytes of an .npz of a dict of arrays: compressed (zlib level), sorted by name, no time stamps or pickles."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in sorted(arrays):
@@ -148,7 +148,7 @@ def npz_bytes(arrays):
             entry.create_system = 3  # else the operating system's, and bytes differ between platforms
             content = io.BytesIO()
             np.lib.format.write_array(content, np.asarray(arrays[name]), version=(1, 0), allow_pickle=False)
-            archive.writestr(entry, content.getvalue(), compresslevel=7)
+            archive.writestr(entry, content.getvalue(), compresslevel=level)
     return buffer.getvalue()
 
 

@@ -1,0 +1,30 @@
+"""How files appear: whole or not at all, and only inside the folder they belong to."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from facewright.errors import InputError
+
+
+def replace_file(path, content):
+    """Write bytes so that the file appears whole or not at all; makes its folder. InputError when it cannot."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            temporary.write_bytes(content)
+            os.replace(temporary, path)
+        except OSError:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise InputError(f"write: cannot write {path}: {error.strerror}; choose a folder you may write to") from error
+
+
+def file_name(name):
+    """A name of the rig (a mesh, a map, a target) as a file name: whatever it holds, it cannot leave its folder."""
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in str(name)).lstrip(".")
+    return safe or "unnamed"
