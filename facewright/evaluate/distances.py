@@ -1,0 +1,197 @@
+"""How far a fitted template and its scan lie apart: the definitions of every distance in reports and benchmarks.
+
+scan_to_face: points sampled evenly by area on the scan whose nearest point on the template lies in a region.
+face_to_scan: points sampled evenly by area on that region of the template; one whose nearest scan point lies on a
+border of the scan is left out and counted, since there the scan has no surface. The template's surface is its skin with
+the inside of mouth, sockets and nostrils, and its eyeballs: a scan point on an eye or in a nostril is not called skin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facewright.conventions import INTERPUPILLARY_MM
+from facewright.mesh.adjacency import border_edges
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.normals import face_areas, vertex_normals
+
+PLASTIC = 0.7548776662466927  # with its square the least regular pair of steps on the unit square
+
+
+@dataclass(frozen=True)
+class SurfaceSamples:
+    """points (k, 3), faces (k,), barycentric (k, 3): area-even samples of a surface."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    barycentric: np.ndarray
+
+
+def sample_surface(vertices, faces, count, subset=None):
+    """SurfaceSamples of `count` points spread evenly by area, the same on every run.
+
+    vertices (n, 3), faces (m, 3); subset (m,) bool limits them to some faces. A systematic walk over the cumulated
+    area chooses the face, a low-discrepancy sequence the place in it.
+    """
+    chosen = np.arange(len(faces)) if subset is None else np.flatnonzero(subset)
+    areas = face_areas(vertices, faces[chosen])
+    total = np.cumsum(areas)
+    if not len(chosen) or total[-1] <= 0:
+        return SurfaceSamples(np.empty((0, 3)), np.empty(0, np.int64), np.empty((0, 3)))
+    steps = (np.arange(count) + 0.5) / count * total[-1]
+    face = chosen[np.minimum(np.searchsorted(total, steps), len(chosen) - 1)]
+    u = (0.5 + np.arange(count) * PLASTIC) % 1.0
+    v = (0.5 + np.arange(count) * PLASTIC**2) % 1.0
+    outside = u + v > 1.0
+    u, v = np.where(outside, 1.0 - u, u), np.where(outside, 1.0 - v, v)
+    barycentric = np.stack([1.0 - u - v, u, v], axis=1)
+    return SurfaceSamples(interpolate(vertices, faces, face, barycentric), face, barycentric)
+
+
+def summary(distances, left_out=0.0):
+    """dict of mean, rms, p95, max (mm) and the share left out; figures are None without a sample."""
+    if not len(distances):
+        return {"mean": None, "rms": None, "p95": None, "max": None, "left_out": float(left_out), "count": 0}
+    return {
+        "mean": float(np.mean(distances)),
+        "rms": float(np.sqrt(np.mean(np.square(distances)))),
+        "p95": float(np.percentile(distances, 95)),
+        "max": float(np.max(distances)),
+        "left_out": float(left_out),
+        "count": len(distances),
+    }
+
+
+def in_region(mask, faces, samples_faces, barycentric):
+    """(k,) bool: the template vertex that weighs most at each point belongs to the region (n,)."""
+    corners = faces[samples_faces]
+    return mask[corners[np.arange(len(corners)), barycentric.argmax(axis=1)]]
+
+
+def on_border(faces, closest_faces, barycentric, tolerance=1e-9):
+    """(k,) bool: points given by face and barycentric coordinates lie on a border edge or border vertex of F (m, 3)."""
+    edges = border_edges(faces)
+    n = int(faces.max()) + 1
+    keys = np.sort(np.minimum(edges[:, 0], edges[:, 1]) * n + np.maximum(edges[:, 0], edges[:, 1]))
+    is_border_vertex = np.zeros(n, bool)
+    is_border_vertex[edges.ravel()] = True
+    corners = faces[closest_faces]
+    zero = barycentric < tolerance
+    result = np.zeros(len(corners), bool)
+    for corner in range(3):
+        a, b = corners[:, (corner + 1) % 3], corners[:, (corner + 2) % 3]
+        result |= zero[:, corner] & np.isin(np.minimum(a, b) * n + np.maximum(a, b), keys)
+        alone = zero[:, (corner + 1) % 3] & zero[:, (corner + 2) % 3]
+        result |= alone & is_border_vertex[corners[:, corner]]
+    return result
+
+
+def surface_faces(template):
+    """(m,) bool: the faces of a Template that distances are measured on: the skin and the eyeballs."""
+    mask = np.zeros(len(template.faces), bool)
+    for part in template.parts:
+        if part.name in ("skin", "eye_left", "eye_right"):
+            mask[part.face_slice] = True
+    return mask
+
+
+def interpupillary_mm(vertices, template):
+    """Distance between the centres of the two eyeballs of a fit (n, 3), or None where the template has none."""
+    names = [part.name for part in template.parts]
+    if "eye_left" not in names or "eye_right" not in names:
+        return None
+    left, right = (vertices[template.part(name).vertex_slice] for name in ("eye_left", "eye_right"))
+    middle = [(eye.max(axis=0) + eye.min(axis=0)) / 2 for eye in (left, right)]
+    return float(np.linalg.norm(middle[0] - middle[1]))
+
+
+def benchmark_scale(interpupillary):
+    """Factor that brings a distance to a head with 63 mm between the pupils; 1 where that is unknown."""
+    return INTERPUPILLARY_MM / interpupillary if interpupillary else 1.0
+
+
+def scan_to_face(scan, fit, faces, regions, *, subset=None, count=40000):
+    """Distances of area-even scan samples to the fit, by region of the nearest fit point.
+
+    scan     (vertices (s, 3), faces (t, 3)); subset (t,) bool limits the samples to some of its faces
+    fit      (n, 3), faces (m, 3) the template's surface; regions dict name -> (n,) bool
+    returns  dict name -> summary, with `left_out` the share of all samples whose nearest point is not in the region
+             (meaningful with a subset that was painted for that region), and "normal_deg": the angles' mean by region
+    """
+    vertices, scan_faces = scan
+    samples = sample_surface(vertices, scan_faces, count, subset)
+    nearest = Surface(fit, faces).closest(samples.points)
+    angles = _angles_deg(
+        interpolate(vertex_normals(vertices, scan_faces), scan_faces, samples.faces, samples.barycentric),
+        interpolate(vertex_normals(fit, faces), faces, nearest.faces, nearest.barycentric),
+    )
+    result = {}
+    for name, mask in regions.items():
+        inside = in_region(mask, faces, nearest.faces, nearest.barycentric)
+        result[name] = summary(nearest.distance[inside], 1.0 - inside.mean() if len(inside) else 1.0)
+        result[name]["normal_deg_mean"] = float(angles[inside].mean()) if inside.any() else None
+    return result
+
+
+def face_to_scan(scan, fit, faces, regions, *, count=40000):
+    """Distances of area-even samples of each region of the fit to the scan; arguments as in scan_to_face."""
+    vertices, scan_faces = scan
+    surface = Surface(vertices, scan_faces)
+    result = {}
+    for name, mask in regions.items():
+        samples = sample_surface(fit, faces, count, mask[faces].all(axis=1))
+        if not len(samples.points):
+            result[name] = summary(np.empty(0), 1.0)
+            continue
+        nearest = surface.closest(samples.points)
+        border = on_border(scan_faces, nearest.faces, nearest.barycentric)
+        result[name] = summary(nearest.distance[~border], border.mean())
+    return result
+
+
+def measure_distances(scan, fit, template, regions=None, *, subset=None, count=40000, scale=1.0):
+    """All distance figures of a fit, as report.json has them under `registration`.
+
+    scan     a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template; regions default the template's
+    subset   (t,) bool: only these faces of the scan are asked (a painted skin mask)
+    scale    factor on every distance (benchmark_scale), 1 for plain millimetres
+    returns  dict scan_to_face, face_to_scan (region `face`, nostrils apart), lips.*, nostrils.*, normal_deg_mean
+    """
+    regions = template.regions if regions is None else regions
+    faces = template.faces[surface_faces(template)]
+    asked = {
+        "face": regions["face"] & ~regions["nostrils"],
+        "lips": regions["lips"],
+        "nostrils": regions["nostrils"],
+    }
+    near = _faces_near(scan, fit[asked["face"]]) if subset is None else subset
+    surface = (scan.vertices * scale, scan.faces)
+    to_face = scan_to_face(surface, fit * scale, faces, asked, subset=near, count=count)
+    to_scan = face_to_scan(surface, fit * scale, faces, asked, count=count // 2)
+    normal_deg = to_face["face"]["normal_deg_mean"]
+    for figures in to_face.values():
+        del figures["normal_deg_mean"]
+        if subset is None:
+            figures["left_out"] = 0.0
+    return {
+        "scan_to_face": to_face["face"],
+        "face_to_scan": to_scan["face"],
+        "lips": {"scan_to_face": to_face["lips"], "face_to_scan": to_scan["lips"]},
+        "nostrils": {"scan_to_face": to_face["nostrils"], "face_to_scan": to_scan["nostrils"]},
+        "normal_deg_mean": normal_deg,
+    }
+
+
+def _faces_near(scan, points, margin_mm=40.0):
+    """(t,) bool: scan faces within the box of points (k, 3) and a margin, so that samples go where they count."""
+    centers = scan.vertices[scan.faces].mean(axis=1)
+    return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
+
+
+def _angles_deg(a, b):
+    """(k,) angles between rows; neither needs unit length."""
+    lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    cosine = np.divide((a * b).sum(axis=1), lengths, out=np.ones(len(a)), where=lengths > 0)
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))

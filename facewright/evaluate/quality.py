@@ -1,0 +1,172 @@
+"""Is a fitted or moved mesh sound: folds, tears, self-intersections, lips that part, an inner mouth that shows."""
+
+from __future__ import annotations
+
+import igl.predicates
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.evaluate.distances import on_border, sample_surface
+from facewright.mesh.adjacency import unique_edges
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.normals import face_cross, face_normals, vertex_normals
+from facewright.mesh.raster import Camera, RayScene
+
+SURFACE_NEARBY_MM = 3.0
+VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
+
+
+def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
+    """Indices of faces whose normal is more than 90 degrees from the scan's there.
+
+    scan (vertices, faces); fit (n, 3); faces (m, 3); mask (m,) bool: the faces asked about
+    Only where the scan has surface within nearby_mm that is no border. In a crease (lips, lids, alar grooves) the
+    nearest point may lie on the far wall; so a face counts only if no scan point about as near faces its way.
+    """
+    asked = np.flatnonzero(mask)
+    vertices, scan_faces = scan
+    centers, normals = fit[faces[asked]].mean(axis=1), face_normals(fit, faces[asked])
+    nearest = Surface(vertices, scan_faces).closest(centers)
+    scan_normals = vertex_normals(vertices, scan_faces)
+    there = interpolate(scan_normals, scan_faces, nearest.faces, nearest.barycentric)
+    present = (nearest.distance < nearby_mm) & ~on_border(scan_faces, nearest.faces, nearest.barycentric)
+    suspects = np.flatnonzero(present & ((normals * there).sum(axis=1) < 0))
+    if not len(suspects):
+        return asked[suspects]
+    samples = sample_surface(vertices, scan_faces, count, _near_box(vertices, scan_faces, centers[suspects]))
+    sample_normals = face_normals(vertices, scan_faces)[samples.faces]
+    tree = cKDTree(samples.points)
+    folded = []
+    for suspect in suspects:
+        around = tree.query_ball_point(centers[suspect], nearest.distance[suspect] + 0.6)
+        if not len(around) or (sample_normals[around] @ normals[suspect]).max() < 0:
+            folded.append(suspect)
+    return asked[np.array(folded, np.int64)]
+
+
+def _near_box(vertices, faces, points, margin_mm=5.0):
+    """(m,) bool: faces in the box around points (k, 3)."""
+    centers = vertices[faces].mean(axis=1)
+    return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
+
+
+def folded_by_shape(neutral, moved, faces, mask=None):
+    """Indices of faces turned by more than 90 degrees against the neutral after the best rotation around them.
+
+    neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
+    fitted to the corners of all faces that share a vertex with it (Kabsch).
+    """
+    covariance = _vertex_covariance(neutral, moved, faces)
+    around = covariance[faces].sum(axis=1)  # (m, 3, 3)
+    U, _, Vt = np.linalg.svd(around)
+    flip = np.linalg.det(U @ Vt) < 0
+    U[flip, :, 2] *= -1
+    expected = np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces))
+    folded = (expected * face_normals(moved, faces)).sum(axis=1) < 0
+    return np.flatnonzero(folded if mask is None else folded & mask)
+
+
+def _vertex_covariance(neutral, moved, faces):
+    """(n, 3, 3) sums over the faces at a vertex of (rest edge)(moved edge)^T."""
+    total = np.zeros((len(neutral), 3, 3))
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        rest = neutral[faces[:, b]] - neutral[faces[:, a]]
+        now = moved[faces[:, b]] - moved[faces[:, a]]
+        outer = rest[:, :, None] * now[:, None, :]
+        for corner in range(3):
+            np.add.at(total, faces[:, corner], outer)
+    return total
+
+
+def torn_edges(neutral, moved, faces, mask=None, *, grow_mm=4.0, factor=3.0):
+    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices."""
+    edges = unique_edges(faces)
+    if mask is not None:
+        edges = edges[mask[edges].all(axis=1)]
+    rest = np.linalg.norm(neutral[edges[:, 0]] - neutral[edges[:, 1]], axis=1)
+    now = np.linalg.norm(moved[edges[:, 0]] - moved[edges[:, 1]], axis=1)
+    return edges[(now - rest > grow_mm) & (now > factor * rest)]
+
+
+def self_intersections(vertices, faces, mask=None):
+    """(k, 2) pairs of faces that cross and share no vertex, lower index first.
+
+    vertices (n, 3), faces (m, 3); mask (m,) bool limits both faces of a pair. Exact predicates; touching in a common
+    plane is not crossing.
+    """
+    chosen = np.arange(len(faces)) if mask is None else np.flatnonzero(mask)
+    subset = np.ascontiguousarray(faces[chosen], dtype=np.int64)
+    if not len(subset):
+        return np.empty((0, 2), np.int64)
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+    _, pairs, coplanar = igl.predicates.find_self_intersections(vertices, subset)
+    pairs = np.asarray(pairs).reshape(-1, 2)[np.asarray(coplanar).reshape(-1) == 0]
+    shared = (subset[pairs[:, 0]][:, :, None] == subset[pairs[:, 1]][:, None, :]).any(axis=(1, 2))
+    return np.unique(np.sort(chosen[pairs[~shared]], axis=1), axis=0)
+
+
+def new_self_intersections(vertices, reference, faces, among, region):
+    """(k, 2) crossing pairs of faces that the reference (n, 3) of the same topology does not have.
+
+    among (m,) bool: the faces tested against each other; region (m,) bool: at least one of a pair lies there
+    """
+    now = self_intersections(vertices, faces, among)
+    before = self_intersections(reference, faces, among)
+    keys = [pairs[:, 0] * len(faces) + pairs[:, 1] for pairs in (now, before)]
+    return now[region[now].any(axis=1) & ~np.isin(*keys)]
+
+
+def lip_gaps_mm(vertices, lines):
+    """(k,) distances between paired points of the two lip seams."""
+    return np.linalg.norm(vertices[lines["lip_seam_upper"]] - vertices[lines["lip_seam_lower"]], axis=1)
+
+
+def visible_interior_mm2(vertices, faces, interior, center, *, width_mm=80.0, mm_per_px=0.2, views=VIEWS_OF_MOUTH):
+    """Largest area of interior faces that is seen through the lips from one of the views, mm2 in the picture plane.
+
+    interior (m,) bool: faces of the mouth bag, teeth and tongue; center (3,) the middle of the mouth
+    """
+    scene, pixels = RayScene(vertices, faces), round(width_mm / mm_per_px)
+    most = 0.0
+    for yaw, pitch in views:
+        camera = Camera.looking_at(center, yaw, pitch, width_mm / 2, (pixels, pixels))
+        face = scene.cast(*camera.rays()).face
+        most = max(most, float(interior[face[face >= 0]].sum()) * mm_per_px**2)
+    return most
+
+
+def degenerate_faces(vertices, faces, area_mm2=1e-8):
+    """Indices of faces without area."""
+    return np.flatnonzero(0.5 * np.linalg.norm(face_cross(vertices, faces), axis=1) < area_mm2)
+
+
+def region_faces(mask, faces):
+    """(m,) bool: faces with all corners in a vertex region (n,)."""
+    return mask[faces].all(axis=1)
+
+
+def measure_quality(scan, fit, template, regions=None, lines=None):
+    """Soundness of a fit, as report.json has it under `registration`.
+
+    scan a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template
+    returns dict folded, self_intersections (pairs with a face in region `face` that the neutral has not), lip_gap_mm
+    (largest), visible_mouth_mm2
+    """
+    regions = template.regions if regions is None else regions
+    lines = template.lines if lines is None else lines
+    faces = template.faces
+    in_face = region_faces(regions["face"], faces)
+    skin = np.zeros(len(faces), bool)
+    skin[template.skin.face_slice] = True
+    gaps = lip_gaps_mm(fit, lines)
+    middle = fit[lines["lip_seam_upper"]].mean(axis=0)
+    inside = region_faces(regions["mouth_interior"], faces)
+    for part in template.parts:
+        if part.name in ("teeth_upper", "teeth_lower", "tongue"):
+            inside[part.face_slice] = True
+    return {
+        "folded": len(folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)),
+        "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),
+        "lip_gap_mm": float(gaps.max()),
+        "visible_mouth_mm2": visible_interior_mm2(fit, faces, inside, middle),
+    }
