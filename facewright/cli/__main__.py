@@ -1,0 +1,55 @@
+"""The command line: `facewright COMMAND`. Bad input ends in one sentence and exit code 2, never in a traceback."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from facewright import __version__
+from facewright.errors import InputError, StageError
+
+DESCRIPTION = """Facewright turns one neutral 3D scan of a head into a face rig with the 52 ARKit shapes.
+
+  facewright rig head.obj --albedo head.png --out result/
+  facewright demo"""
+
+
+def build_parser():
+    """The parser of all commands; a command's module is imported only for its own arguments and run."""
+    from facewright.cli import demo, evaluate, rig, template
+
+    parser = argparse.ArgumentParser(
+        prog="facewright", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--version", action="version", version=f"facewright {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, module in (("rig", rig), ("demo", demo), ("template", template), ("evaluate", evaluate)):
+        command = commands.add_parser(
+            name,
+            help=module.HELP,
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    return parser
+
+
+def main(arguments=None):
+    """Run a command; returns the exit code."""
+    options = build_parser().parse_args(arguments)
+    try:
+        return options.run(options) or 0
+    except InputError as error:
+        print(f"facewright: {error}", file=sys.stderr)
+        return 2
+    except StageError as error:
+        print(f"facewright: {error} (outcome: {error.outcome})", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("facewright: stopped; the same command goes on from the last finished stage", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

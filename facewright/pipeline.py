@@ -1,0 +1,282 @@
+"""The main job as a story: one scan in, a rig out, each stage cached so that a killed or changed run resumes."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from facewright import __version__
+from facewright.bake import BakeOptions, bake
+from facewright.cache import StageStore, file_digest, fingerprint
+from facewright.conventions import ARKIT_SHAPES
+from facewright.errors import InputError
+from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
+from facewright.parts import build_rig, fit_parts
+from facewright.read import read_scan
+from facewright.register import RegisterOptions, register
+from facewright.scan import PoseOptions, clean_scan, find_landmarks
+from facewright.template.store import find_template, read_template
+from facewright.transfer import transfer_shapes
+from facewright.write.gltf import write_gltf
+from facewright.write.obj import write_obj
+from facewright.write.preview import write_preview
+from facewright.write.report import build_report, peak_memory_mb, write_json
+from facewright.write.rig import write_rig
+from facewright.write.textures import write_textures
+
+STAGES = ("01-read", "02-landmarks", "03-register", "04-parts", "05-transfer", "06-bake", "07-write")
+# Shares of the whole time on a typical scan: they only feed the "time left" of the progress line.
+STAGE_SHARE = {
+    "01-read": 0.04,
+    "02-landmarks": 0.14,
+    "03-register": 0.30,
+    "04-parts": 0.04,
+    "05-transfer": 0.05,
+    "06-bake": 0.23,
+    "07-write": 0.20,
+}
+
+
+@dataclass(frozen=True)
+class JobOptions:
+    """Options of the main job; each is an option of `facewright rig` too.
+
+    template      name of a template or a folder that holds one
+    albedo        colour image of the scan, overrides what the file names
+    normal_map    tangent-space normal map of the scan (+Y)
+    texture_size  side of the baked maps in pixels
+    units         unit of the scan file: mm, cm, dm, m, inch; default: what the format says, else what fits a face
+    up            the scan's up axis (x, y, z, -x, -y, -z); default: found
+    mirror        the scan is a mirror image of the person: turn it round
+    eyes          "template": closed lids are opened to the template's aperture; "as-scanned": left as they are
+    landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
+    formats       what to write: glb, obj
+    shapes        "apple": exactly the 52 ARKit shapes
+    jobs          threads inside the job; the result does not depend on it
+    from_stage    run this stage and all after it again, whatever is cached
+    """
+
+    template: str = "hm08"
+    albedo: str | None = None
+    normal_map: str | None = None
+    texture_size: int = 2048
+    units: str | None = None
+    up: str | None = None
+    mirror: bool = False
+    eyes: str = "template"
+    landmarks: str | None = None
+    formats: tuple[str, ...] = ("glb",)
+    shapes: str = "apple"
+    jobs: int = 2
+    from_stage: str | None = None
+
+
+class _Run:
+    """The stages of one run: looks each up in the cache, times it, reports progress."""
+
+    def __init__(self, store, progress, from_stage):
+        self.store, self.progress = store, progress
+        self.rerun_from = STAGES.index(_stage_name(from_stage)) if from_stage else len(STAGES)
+        self.key = fingerprint("facewright", __version__)
+        self.seconds, self.reused, self.done = {}, {}, 0.0
+        self.started = time.perf_counter()
+
+    def stage(self, name, work, *depends):
+        """Arrays and info of a stage: from disk if nothing it depends on changed, else from work()."""
+        self.key = fingerprint(self.key, name, *depends)
+        self.tell(name, "")
+        cached = None
+        if STAGES.index(name) < self.rerun_from:
+            cached = self.store.load(name, self.key)
+        else:
+            self.rerun_from = STAGES.index(name)
+        if cached is None:
+            start = time.perf_counter()
+            arrays, info = work()
+            cached = self.store.save(name, self.key, arrays, info, round(time.perf_counter() - start, 3))
+        self.finish(name, cached.seconds, cached.reused)
+        return cached.arrays, cached.info
+
+    def finish(self, name, seconds, reused):
+        """Note a stage's end."""
+        self.seconds[name], self.reused[name] = seconds, reused
+        self.done += STAGE_SHARE[name]
+
+    def tell(self, name, message):
+        """Progress: stage, its number, share done, seconds left or None."""
+        spent = time.perf_counter() - self.started
+        left = None if self.done < 0.1 else spent / self.done * (1 - self.done)
+        if self.progress is not None:
+            self.progress(name, STAGES.index(name) + 1, len(STAGES), left, message)
+
+
+def _stage_name(word):
+    matches = [stage for stage in STAGES if word in (stage, stage.split("-", 1)[1], stage.split("-", 1)[0])]
+    if not matches:
+        names = ", ".join(stage.split("-", 1)[1] for stage in STAGES)
+        raise InputError(f"--from {word}: there is no such stage; the stages are {names}")
+    return matches[0]
+
+
+def rig_job(path, out, options=None, progress=None):
+    """Run the whole job: read path, write the rig into the folder out.
+
+    progress  function (stage, number, count, seconds_left or None, message), or None
+    returns   the report as a dict (what report.json holds)
+    raises    InputError for input that cannot be used: nothing half-written is left behind
+    """
+    options = options or JobOptions()
+    out = Path(out)
+    inputs = _input_digests(path, options)
+    folder = find_template(options.template)
+    created = _prepare_folder(out)
+    try:
+        return _run_job(Path(path), out, options, inputs, folder, progress)
+    except InputError:
+        if created:
+            shutil.rmtree(out, ignore_errors=True)
+        raise
+
+
+def _run_job(path, out, options, inputs, folder, progress):
+    store = StageStore(out / "stages")
+    store.sweep()
+    run = _Run(store, progress, options.from_stage)
+    scan, clean_stats = _read(run, path, options, inputs)
+    scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
+    run.tell("03-register", "reading the template")
+    template = read_template(folder)
+    face = _register(run, scan, landmarks, template, folder, options)
+    face = _parts(run, face, template)
+    deltas = _transfer(run, face, template)
+    maps = _bake(run, scan, face, options)
+    started = time.perf_counter()
+    run.tell("07-write", "")
+    rig = build_rig(face, deltas, maps)
+    rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
+    report = build_report(scan, face, rig, clean_stats, pose_info)
+    _write(rig, maps, scan, face, out, options)
+    run.finish("07-write", round(time.perf_counter() - started, 3), False)
+    report["timings_s"] = run.seconds
+    report["reused"] = run.reused
+    report["peak_memory_mb"] = peak_memory_mb()
+    report["options"] = asdict(options) | {"formats": list(options.formats)}
+    write_json(report, out / "report.json")
+    return report
+
+
+def _read(run, path, options, inputs):
+    def work():
+        run.tell("01-read", f"reading {path.name}")
+        scan = read_scan(path, albedo=options.albedo, normal_map=options.normal_map, unit=options.units)
+        scan, stats = clean_scan(scan)
+        arrays, info = pack_scan(scan)
+        return arrays, info | {"clean": stats}
+
+    arrays, info = run.stage("01-read", work, inputs["scan"], options.units)
+    return unpack_scan(arrays, info), info["clean"]
+
+
+def _landmarks(run, scan, options, inputs):
+    def work():
+        pose = find_landmarks(
+            scan,
+            PoseOptions(up=options.up, units=options.units, mirror=options.mirror, landmarks=options.landmarks),
+        )
+        arrays, info = pack_scan(pose.scan)
+        marks, names = pack_landmarks(pose.landmarks)
+        return arrays | marks, info | names | {"pose": pose.info}
+
+    depends = [options.up, options.units, options.mirror, inputs["landmarks"]]
+    arrays, info = run.stage("02-landmarks", work, depends)
+    return unpack_scan(arrays, info), unpack_landmarks(arrays, info), info["pose"]
+
+
+def _register(run, scan, landmarks, template, folder, options):
+    register_options = RegisterOptions(eyes=options.eyes)
+
+    def work():
+        return pack_face(register(scan, landmarks, template, register_options))
+
+    template_key = [file_digest(folder / name) for name in ("template.toml", "arrays.npz")]
+    arrays, info = run.stage("03-register", work, asdict(register_options), template_key)
+    return unpack_face(arrays, info, template)
+
+
+def _parts(run, face, template):
+    def work():
+        return pack_face(fit_parts(face))
+
+    arrays, info = run.stage("04-parts", work)
+    return unpack_face(arrays, info, template)
+
+
+def _transfer(run, face, template):
+    def work():
+        return {"deltas": transfer_shapes(face)}, {"names": list(template.shape_names)}
+
+    arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
+    return arrays["deltas"]
+
+
+def _bake(run, scan, face, options):
+    bake_options = BakeOptions(size=options.texture_size)
+
+    def work():
+        return bake(scan, face, bake_options), {}
+
+    arrays, _ = run.stage("06-bake", work, asdict(bake_options))
+    return arrays
+
+
+def _write(rig, maps, scan, face, out, options):
+    if "glb" in options.formats:
+        write_gltf(rig, out / "rig.glb")
+    if "obj" in options.formats:
+        write_obj(rig, out / "obj")
+    write_rig(rig, out / "rig")
+    write_textures(maps, out / "textures", rig)
+    write_preview(rig, scan, face, out / "preview.png")
+
+
+def _rig_to_scan(scan):
+    """(4, 4): metres of rig.glb to the scan file's own units."""
+    return scan.T_ours_to_scan @ np.diag([1000.0, 1000.0, 1000.0, 1.0])
+
+
+def _input_digests(path, options) -> dict[str, Any]:
+    """Digests of everything the user gave; InputError for what is not there."""
+    files = {"scan": path, "albedo": options.albedo, "normal_map": options.normal_map}
+    digests: dict[str, Any] = {}
+    for what, file in {**files, "landmarks": options.landmarks}.items():
+        if file is None:
+            digests[what] = None
+            continue
+        try:
+            digests[what] = file_digest(file)
+        except OSError as error:
+            raise InputError(f"{what}: cannot read {file}: {error.strerror}; check the path") from error
+    # What an OBJ names (materials, images) lies beside it: its own bytes do not change when they do.
+    beside = sorted(Path(path).parent.glob("*")) if Path(path).suffix.lower() in (".obj", ".gltf") else []
+    named = [file for file in beside if file.suffix.lower() in (".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".bin")]
+    digests["scan"] = [digests["scan"], digests["albedo"], digests["normal_map"]]
+    digests["scan"] += [[file.name, file_digest(file)] for file in named if file.is_file()]
+    return digests
+
+
+def _prepare_folder(out):
+    """Make the output folder; True if it was made now."""
+    created = not out.exists()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / ".facewright-write-test"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise InputError(f"output folder {out}: cannot write there ({error.strerror}); choose another --out") from error
+    return created

@@ -1,0 +1,161 @@
+"""Similarity, identity and a little expression of a template fitted to a scan by Gauss-Newton with priors.
+
+Minimises   1/sigma^2 sum_i a_i rho(n_i . (x_i - p_i))  +  sum_l w_l |x_l - q_l|^2  +  |alpha|^2 + |eps/sigma_e|^2
+over x = s R (mean + B alpha + E eps) + t, with a_i vertex areas (summing to n_effective), p_i nearest scan points and
+q_l landmarks. The landmarks lead at first and fade: their bias (1 to 3 mm) must not bend the shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from facewright.mesh.laplacian import lumped_mass
+from facewright.mesh.normals import vertex_normals
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """sigma_mm: what the identity modes cannot explain; n_effective: independent observations that the scan counts as.
+
+    expression_std: how far expression may go from rest; iterations of the surface stage
+    """
+
+    sigma_mm: float = 0.7
+    n_effective: float = 500.0
+    expression_std: float = 0.25
+    iterations: int = 25
+    landmark_sigma_mm: float = 2.0
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """vertices (n, 3); alpha (i,) identity in standard deviations; expression (e,); T (4, 4) similarity; rms mm."""
+
+    vertices: np.ndarray
+    alpha: np.ndarray
+    expression: np.ndarray
+    T: np.ndarray
+    rms: float
+
+
+def fit_model(mean, basis, expressions, faces, weights, target, landmark_points, landmark_rows, landmark_weights, options):
+    """Fit the model to a scan.
+
+    mean (n, 3), basis (i, n, 3) one standard deviation each, expressions (e, n, 3) deltas at weight 1, faces (m, 3)
+    weights (n,) trust in each vertex, 0 leaves it out; target: correspond.Target
+    landmark_points (l, 3) on the scan; landmark_rows: scipy sparse (l, n) that takes template vertices to landmarks
+    returns ModelFit
+    """
+    state = _State(mean, basis, expressions)
+    sampled = _sample_rows(mean, faces, weights)
+    areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
+    areas *= options.n_effective / areas.sum()
+    landmark_model = _project(landmark_rows, mean, basis, expressions)
+    for _ in range(8):
+        rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
+        state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)], options)
+    for iteration in range(options.iterations):
+        progress = iteration / max(1, options.iterations - 1)
+        vertices = state.vertices()
+        normals = vertex_normals(vertices, faces)
+        reach = 25.0 * (1 - progress) + 6.0
+        matches = target.match(vertices[sampled], normals[sampled], max_distance=reach, tau=max(2.0, reach / 3))
+        jacobian = state.jacobian(mean[sampled], basis[:, sampled], expressions[:, sampled])  # (k, 3, p)
+        rows = np.einsum("kc,kcp->kp", matches.normals, jacobian)
+        residuals = np.einsum("kc,kc->k", matches.normals, vertices[sampled] - matches.points)
+        surface = (rows, residuals, areas * matches.weights / options.sigma_mm**2)
+        rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
+        fading = (1 - progress) ** 2 + 0.05
+        landmarks = (rows, residuals, fading * row_weights / options.landmark_sigma_mm**2)
+        state.step([surface, landmarks], options)
+    vertices = state.vertices()
+    matches = target.match(vertices[sampled], vertex_normals(vertices, faces)[sampled], max_distance=6.0)
+    rms = float(np.sqrt(np.average(matches.distance**2, weights=areas * matches.weights + 1e-12)))
+    return ModelFit(vertices, state.alpha, state.expression, state.T(), rms)
+
+
+def _sample_rows(mean, faces, weights, count=5000):
+    """Trusted vertices, thinned evenly to about count."""
+    rows = np.flatnonzero(weights > 0)
+    return rows[:: max(1, len(rows) // count)]
+
+
+def _project(matrix, mean, basis, expressions):
+    return (
+        matrix @ mean,
+        np.stack([matrix @ mode for mode in basis]) if len(basis) else np.zeros((0, matrix.shape[0], 3)),
+        np.stack([matrix @ shape for shape in expressions])
+        if len(expressions)
+        else np.zeros((0, matrix.shape[0], 3)),
+    )
+
+
+def _landmark_rows(state, landmark_model, points, weights):
+    mean, basis, expressions = landmark_model
+    positions = state.positions(mean, basis, expressions)
+    jacobian = state.jacobian(mean, basis, expressions)
+    rows = jacobian.reshape(-1, jacobian.shape[2])  # (3l, p)
+    distance = np.linalg.norm(positions - points, axis=1)
+    robust = (25.0 / (25.0 + distance**2)) ** 2 * weights
+    return rows, (positions - points).ravel(), np.repeat(robust, 3)
+
+
+class _State:
+    """The parameters, and the geometry and its derivative for any rows of the model."""
+
+    def __init__(self, mean, basis, expressions):
+        self.mean, self.basis, self.expressions = mean, basis, expressions
+        self.alpha = np.zeros(len(basis))
+        self.expression = np.zeros(len(expressions))
+        self.R, self.s, self.t = np.eye(3), 1.0, np.zeros(3)
+
+    def T(self):
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.s * self.R, self.t
+        return T
+
+    def positions(self, mean, basis, expressions):
+        shape = mean + np.tensordot(self.alpha, basis, 1) + np.tensordot(self.expression, expressions, 1)
+        return self.s * shape @ self.R.T + self.t
+
+    def vertices(self):
+        return self.positions(self.mean, self.basis, self.expressions)
+
+    def jacobian(self, mean, basis, expressions):
+        """(k, 3, p): columns are identity, expression, rotation (3), log scale, translation (3)."""
+        positions = self.positions(mean, basis, expressions)
+        linear = np.concatenate([basis, expressions]) @ (self.s * self.R.T)  # (i + e, k, 3)
+        arm = positions - self.t
+        k = len(mean)
+        cross = np.zeros((k, 3, 3))  # d(w x arm)/dw = -[arm]_x
+        cross[:, 0, 1], cross[:, 0, 2] = arm[:, 2], -arm[:, 1]
+        cross[:, 1, 0], cross[:, 1, 2] = -arm[:, 2], arm[:, 0]
+        cross[:, 2, 0], cross[:, 2, 1] = arm[:, 1], -arm[:, 0]
+        eye = np.broadcast_to(np.eye(3), (k, 3, 3))
+        return np.concatenate([linear.transpose(1, 2, 0), cross, arm[:, :, None], eye], axis=2)
+
+    def step(self, terms, options):
+        """One Gauss-Newton step on weighted rows, with the priors."""
+        n_identity, n_expression = len(self.alpha), len(self.expression)
+        p = n_identity + n_expression + 7
+        A, b = np.zeros((p, p)), np.zeros(p)
+        for rows, residuals, weights in terms:
+            weighted = rows * weights[:, None]
+            A += weighted.T @ rows
+            b -= weighted.T @ residuals
+        prior = np.concatenate(
+            [np.ones(n_identity), np.full(n_expression, options.expression_std**-2), np.full(7, 1e-6)]
+        )
+        value = np.concatenate([self.alpha, self.expression, np.zeros(7)])
+        A[np.diag_indices(p)] += prior
+        b -= prior * value
+        step = np.linalg.solve(A, b)
+        self.alpha = np.clip(self.alpha + step[:n_identity], -4, 4)
+        self.expression = np.clip(self.expression + step[n_identity : n_identity + n_expression], -0.3, 1.1)
+        turn = Rotation.from_rotvec(step[-7:-4]).as_matrix()
+        self.R = turn @ self.R
+        self.s *= float(np.exp(step[-4]))
+        self.t = self.t + step[-3:]

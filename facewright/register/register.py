@@ -1,0 +1,234 @@
+"""Registration: a template fitted to one cleaned scan in our frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from facewright.data import Face
+from facewright.mesh.normals import vertex_normals
+from facewright.mesh.render import sample_texture
+from facewright.register.correspond import Target
+from facewright.register.lines import CreaseOptions, trace_crease
+from facewright.register.model import ModelOptions, fit_model
+from facewright.register.neutral import take_out_expression
+from facewright.register.skin import contact_rows, fit_skin, line_rows, skin_rules
+from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, LIPS_INNER, LIPS_OUTER, NOSE
+from facewright.mesh.openness import vertex_openness
+
+REST_SHAPES = (
+    "mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthPressLeft mouthPressRight "
+    "browInnerUp browDownLeft browDownRight"
+).split()
+SIDES = {"left": "Left", "right": "Right"}
+USER_WEIGHT = 1.0
+"""A landmark with more weight than this was placed by a person and is obeyed."""
+
+
+@dataclass(frozen=True)
+class RegisterOptions:
+    """eyes: "template" opens closed lids to the template's aperture, "as-scanned" leaves them."""
+
+    eyes: str = "template"
+    model: ModelOptions = field(default_factory=ModelOptions)
+
+
+# (w_bend, w_stretch, tau mm, reach mm) per level; tuned on heads with known truth (bench/registration_truth.py):
+# lower final stiffness gains distance and loses correspondence, so the last levels only take up the scan's detail.
+LEVELS = tuple((w, w / 5, 3.0, 10.0) for w in (100.0, 45.0, 20.0, 10.0, 5.0))
+DETAIL = ((1.0, 0.2, 1.5, 4.0), (0.2, 0.05, 1.0, 3.0))
+
+
+def register(scan, landmarks, template, options=None):
+    """Fit a template to a scan.
+
+    scan       data.Scan, cleaned, in our frame (mm)
+    landmarks  data.Landmarks on the scan, MediaPipe names; weights over 1 mark points that a person placed
+    template   data.Template
+    returns    data.Face: fit (as the scan is), vertices (neutral), regions, lines, observed, statistics
+    """
+    options = options or RegisterOptions()
+    target = Target(scan.vertices, scan.faces, vertex_openness(scan.vertices, scan.faces))
+    pairs = _landmark_pairs(scan, landmarks, template)
+    closed = eyes_closed(pairs)
+    model, names = _fit_model(template, target, pairs, closed, options.model)
+    lines, leading, line_stats = _leading_lines(scan, template, model, pairs, closed)
+    stop = template.skin.vertices[1]
+    faces = template.faces[template.skin.face_slice]
+    rules = skin_rules(template)
+    skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
+    fit = model.vertices.copy()
+    fit[:stop] = skin
+    expression = dict(zip(names, np.round(model.expression, 4).tolist()))
+    neutral, removed = fit, {}
+    if options.eyes == "template":
+        neutral, removed = take_out_expression(template, fit, expression)
+    observed = np.zeros(len(fit), bool)
+    observed[:stop] = matches.weights > 0.05
+    stats = {
+        "model_rms_mm": model.rms,
+        "identity_std": float(np.sqrt(np.mean(model.alpha**2))) if len(model.alpha) else 0.0,
+        "landmarks_used": len(pairs.names),
+        "landmark_mm": _landmark_error(pairs, fit),
+        "expression_found": expression,
+        "T_template_to_ours": model.T.tolist(),
+        **line_stats,
+    }
+    return Face(
+        template=template,
+        vertices=neutral,
+        fit=fit,
+        regions=template.regions,
+        lines=template.lines,
+        observed=observed,
+        expression=removed,
+        eyes_closed=closed,
+        stats=stats,
+    )
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Landmarks that scan and template share: names (l,), points (l, 3) on the scan, rows (l, n), weights (l,)."""
+
+    names: tuple[str, ...]
+    points: np.ndarray
+    rows: sp.csr_matrix
+    weights: np.ndarray
+    rest: np.ndarray
+
+
+def _landmark_pairs(scan, landmarks, template):
+    on_template = {name: i for i, name in enumerate(template.landmarks.names)}
+    led = {f"mp{i}" for i in LIPS_OUTER + LIPS_INNER + EYE_LEFT + EYE_RIGHT + NOSE}
+    keep = [
+        (i, on_template[name])
+        for i, name in enumerate(landmarks.names)
+        if name in on_template
+        and landmarks.weights[i] > 0
+        and (name in led or landmarks.weights[i] > USER_WEIGHT)
+        and template.landmarks.weights[on_template[name]] > 0
+    ]
+    on_scan, rows_of = np.array(keep, np.int64).reshape(-1, 2).T
+    points = landmarks.positions(scan.vertices, scan.faces)[on_scan]
+    marks, faces = template.landmarks, template.faces
+    k = len(rows_of)
+    columns = faces[marks.faces[rows_of]]
+    rows = sp.csr_matrix(
+        (marks.barycentric[rows_of].ravel(), (np.repeat(np.arange(k), 3), columns.ravel())),
+        shape=(k, len(template.vertices)),
+    )
+    names = tuple(landmarks.names[i] for i in on_scan)
+    return _Pairs(names, points, rows, landmarks.weights[on_scan], rows @ template.vertices)
+
+
+def eyes_closed(pairs):
+    """{"left": bool, "right": bool}: the lids' landmarks are nearer to each other than a fifth of the rest face's."""
+    index = {name: i for i, name in enumerate(pairs.names)}
+    lids = {"left": ((386, 374), (385, 380), (387, 373)), "right": ((159, 145), (158, 153), (160, 144))}
+    widths = {"left": (362, 263), "right": (133, 33)}
+    result = {}
+    for side, columns in lids.items():
+        ratio = []
+        for points in (pairs.points, pairs.rest):
+            ends = [points[index[f"mp{i}"]] for i in widths[side] if f"mp{i}" in index]
+            gaps = [
+                np.linalg.norm(points[index[f"mp{a}"]] - points[index[f"mp{b}"]])
+                for a, b in columns
+                if f"mp{a}" in index and f"mp{b}" in index
+            ]
+            width = np.linalg.norm(ends[0] - ends[1]) if len(ends) == 2 else np.inf
+            ratio.append(float(np.mean(gaps)) / width if gaps else np.nan)
+        result[side] = bool(ratio[0] < 0.45 * ratio[1])
+    return result
+
+
+def _fit_model(template, target, pairs, closed, options):
+    names = list(REST_SHAPES) + [f"eyeBlink{SIDES[side]}" for side in SIDES if closed[side]]
+    expressions = np.stack([template.shape(name) for name in names])
+    stop = template.skin.vertices[1]
+    trust = np.zeros(len(template.vertices))
+    trust[:stop] = skin_rules(template).trust
+    trust[~template.regions["face"]] *= 0.3
+    shut = sum(closed.values())
+    for name in names[-shut:] if shut else ():
+        pass
+    model = fit_model(
+        template.vertices,
+        template.identity_basis,
+        expressions,
+        template.faces[template.skin.face_slice],
+        trust,
+        target,
+        pairs.points,
+        pairs.rows,
+        pairs.weights,
+        options,
+    )
+    return model, names
+
+
+def _leading_lines(scan, template, model, pairs, closed):
+    """Feature lines found on the scan, the rows that lead the skin to them, and what to report."""
+    stop = template.skin.vertices[1]
+    faces = template.faces[template.skin.face_slice]
+    normals = vertex_normals(model.vertices[:stop], faces)
+    darkness = texture_darkness(scan)
+    found, leading, stats = {}, [], {}
+    upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
+    middle = 0.5 * (model.vertices[upper] + model.vertices[lower])
+    forward = normals[template.regions["lips"][:stop]].mean(axis=0)
+    crease = trace_crease(scan.vertices, scan.faces, middle, forward, CreaseOptions(), darkness)
+    stats["lips_closed"] = crease.found
+    stats["lip_crease_mm"] = float(np.median(crease.strength))
+    if crease.found:
+        found["lip_seam"] = crease.points
+        for line in (upper, lower):
+            leading.append(line_rows(line, crease.points, 8.0, stop))
+        contact = contact_rows(upper[1:-1], lower[1:-1], 30.0, stop)
+        leading.append(lambda _vertices: contact)
+    for side in SIDES:
+        if not closed[side]:
+            continue
+        lid_upper, lid_lower = template.lines[f"lid_upper_{side}"], template.lines[f"lid_lower_{side}"]
+        line = model.vertices[lid_upper]
+        lid = template.regions["eyes"][:stop] & (np.sign(template.vertices[:stop, 0]) == (1 if side == "left" else -1))
+        crease = trace_crease(
+            scan.vertices, scan.faces, _from_right(line), normals[lid].mean(axis=0), CreaseOptions(half_band_mm=4.0), darkness
+        )
+        stats[f"lid_crease_{side}_mm"] = float(np.median(crease.strength))
+        if crease.found:
+            points = crease.points if side == "left" else crease.points[::-1]
+            found[f"lid_line_{side}"] = points
+            for margin in (lid_upper, lid_lower):
+                leading.append(line_rows(margin, points, 8.0, stop))
+    return found, tuple(leading), stats
+
+
+def _from_right(line):
+    return line if line[0, 0] < line[-1, 0] else line[::-1]
+
+
+def texture_darkness(scan):
+    """Function (faces, barycentric) -> darkness 0..1 of a textured scan, or None."""
+    if not scan.has_texture:
+        return None
+
+    def darkness(faces, barycentric):
+        uv = np.einsum("kc,kcd->kd", barycentric, scan.uv[scan.uv_faces[faces]])
+        result = np.zeros(len(faces))
+        which = scan.face_texture[faces] if scan.face_texture is not None else np.zeros(len(faces), np.int64)
+        for i, image in enumerate(scan.textures):
+            mine = which == i
+            if mine.any():
+                result[mine] = 1.0 - sample_texture(image, uv[mine])[:, :3].mean(axis=1) / 255.0
+        return result
+
+    return darkness
+
+
+def _landmark_error(pairs, fit):
+    error = np.linalg.norm(pairs.rows @ fit - pairs.points, axis=1)
+    return {"mean": float(error.mean()), "p95": float(np.quantile(error, 0.95)), "max": float(error.max())}

@@ -1,0 +1,144 @@
+"""report.json: what was found, repaired, fitted and removed. Every figure comes from evaluate/."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import sys
+
+import numpy as np
+
+from facewright import __version__
+from facewright.evaluate.distances import measure_distances
+from facewright.evaluate.quality import measure_quality
+from facewright.evaluate.seam import measure_seam
+from facewright.evaluate.symmetry import measure_symmetry
+from facewright.write.files import replace_file
+
+PACKAGES = ("numpy", "scipy", "cholespy", "libigl", "embreex", "pillow", "mediapipe")
+
+
+def build_report(scan, face, rig, clean_stats, pose_info):
+    """The report as a dict, without times and memory.
+
+    scan in our frame, face data.Face, rig data.Rig, clean_stats of clean_scan, pose_info of find_landmarks
+    """
+    registration = measure_distances(scan, face.fit, face.template, face.regions)
+    registration |= measure_quality(scan, face.fit, face.template, face.regions, face.lines)
+    registration |= measure_seam(scan, face.fit, face.lines)
+    registration["landmark_mm"] = face.stats["landmark_mm"]
+    registration["model"] = {key: face.stats[key] for key in ("model_rms_mm", "identity_std", "landmarks_used")}
+    return {
+        "format": 1,
+        "facewright": __version__,
+        "versions": {name: _version(name) for name in PACKAGES} | {"python": sys.version.split()[0]},
+        "template": {key: face.template.info.get(key) for key in ("name", "version", "topology_id")},
+        "scan": {"vertices": len(scan.vertices), "faces": len(scan.faces), "textured": scan.has_texture},
+        "cleaning": clean_stats,
+        "pose": pose_info,
+        "registration": registration,
+        "neutral": neutral_changes(face),
+        "eyes_closed_on_scan": face.eyes_closed,
+        "expression_removed": face.expression,
+        "expression_found": face.stats["expression_found"],
+        "symmetry_mm": measure_symmetry(face.vertices, face.template.mirror, face.regions),
+        "T_rig_to_scan": rig.info["T_rig_to_scan"],
+        "targets": len(rig.target_names),
+        "warnings": warnings(scan, face, registration, clean_stats, pose_info),
+    }
+
+
+def neutral_changes(face):
+    """How far the rig's neutral is from the fit: mean outside eyes and lips, and the largest removal with its region."""
+    moved = np.linalg.norm(face.vertices - face.fit, axis=1)
+    regions = face.regions
+    outside = regions["face"] & ~regions["eyes"] & ~regions["lips"]
+    outer = np.flatnonzero(regions["outer"])
+    worst = outer[moved[outer].argmax()]
+    names = ("eyes", "lips", "nostrils", "face", "scalp", "neck")
+    where = next((name for name in names if name in regions and regions[name][worst]), "outer")
+    return {
+        "face_outside_eyes_and_lips_mean_mm": float(moved[outside].mean()),
+        "face_outside_eyes_and_lips_max_mm": float(moved[outside].max()),
+        "largest_mm": float(moved[worst]),
+        "largest_region": where,
+    }
+
+
+def warnings(scan, face, registration, clean_stats, pose_info):
+    """Sentences a user should read: doubt is said, never hidden."""
+    notes = [*scan.notes, *pose_info.get("notes", ())]
+    notes = list(dict.fromkeys(notes))
+    shut = [side for side, closed in face.eyes_closed.items() if closed]
+    if shut:
+        how = "opened to the template's aperture" if face.expression else "left closed"
+        notes.append(f"eyes closed on the scan ({', '.join(shut)}): {how}")
+    removed = {name: weight for name, weight in face.expression.items() if not name.startswith("eyeBlink")}
+    if removed:
+        listed = ", ".join(f"{name} {weight:.2f}" for name, weight in removed.items())
+        notes.append(f"expression taken out of the neutral: {listed}")
+    if not face.stats.get("lips_closed", True):
+        notes.append("no crease between the lips was found on the scan: the mouth follows the model, look at it")
+    if registration["scan_to_face"]["p95"] is not None and registration["scan_to_face"]["p95"] > 1.0:
+        notes.append(
+            f"the fit is poor: 5 % of the face are over {registration['scan_to_face']['p95']:.1f} mm from the scan; "
+            "move landmarks with --landmarks"
+        )
+    if registration["folded"]:
+        notes.append(f"{registration['folded']} faces of the fit are folded")
+    return notes
+
+
+def write_json(document, path):
+    """Write JSON with sorted keys and finite numbers only."""
+    replace_file(path, (json.dumps(_plain(document), indent=1, sort_keys=True) + "\n").encode())
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return round(float(value), 6) if math.isfinite(value) else None
+    return value
+
+
+def peak_memory_mb():
+    """Peak resident memory of this process, MB."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return _peak_memory_windows_mb()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1024.0 if sys.platform != "darwin" else 1024.0**2), 1)
+
+
+def _peak_memory_windows_mb():
+    import ctypes
+    from ctypes import wintypes
+
+    class Counters(ctypes.Structure):
+        _fields_ = [("cb", wintypes.DWORD), ("faults", wintypes.DWORD)] + [
+            (name, ctypes.c_size_t)
+            for name in ("peak", "working", "qpp", "qp", "qpnp", "qnp", "pagefile", "peak_pagefile")
+        ]
+
+    counters = Counters(cb=ctypes.sizeof(Counters))
+    process = ctypes.windll.kernel32.GetCurrentProcess()
+    ctypes.windll.psapi.GetProcessMemoryInfo(process, ctypes.byref(counters), counters.cb)
+    return round(counters.peak / 1024.0**2, 1)
+
+
+def _version(package):
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
