@@ -13,7 +13,7 @@ import numpy as np
 
 from facewright.data import Landmarks
 from facewright.mesh.closest import Surface, interpolate
-from facewright.mesh.normals import face_normals
+from facewright.mesh.normals import face_normals, vertex_normals
 from facewright.mesh.raster import Camera, RayScene
 from facewright.mesh.render import render_with_hits
 from facewright.scan.detector import LANDMARK_NAMES, N_LANDMARKS, canonical_landmarks, detect_landmarks
@@ -99,37 +99,37 @@ def cast_pixels(scene, camera, pixels):
     return scene.cast(origins, np.broadcast_to(-camera.R[2], origins.shape))
 
 
-def sight_landmarks(vertices, faces, looks, cameras, *, unlit=False):
-    """Sightings of a mesh (vertices (n, 3) about mm, faces (m, 3)) wearing looks, by cameras."""
+def sight_landmarks(vertices, faces, wardrobe, cameras, *, unlit=False):
+    """Sightings of a mesh by cameras, one list entry for each Looks of the wardrobe.
+
+    vertices (n, 3) about mm and about the origin, faces (m, 3)
+    unlit    show textures and colours as they are; clay is always lit
+    """
     scene = RayScene(vertices, faces)
-    normals = face_normals(vertices, faces)
-    colors = None if looks.colors is None else np.asarray(looks.colors)
-    points, facing, seen = [], [], np.zeros(len(faces), bool)
+    of_faces, of_vertices = face_normals(vertices, faces), vertex_normals(vertices, faces)
+    seen = np.zeros(len(faces), bool)
+    points, facing = [[] for _ in wardrobe], [[] for _ in wardrobe]
     for camera in cameras:
-        image, hits = render_with_hits(
-            vertices,
-            faces,
-            camera,
-            colors=colors,
-            texture=looks.texture,
-            uv=looks.uv,
-            uv_faces=looks.uv_faces,
-            unlit=unlit,
-        )
+        hits = scene.cast(*camera.rays())
         seen[hits.face[hits.face >= 0]] = True
-        pixels = detect_both_ways(image)
-        if pixels is None:
-            continue
-        lifted = cast_pixels(scene, camera, pixels)
-        hit = lifted.face >= 0
-        points.append(interpolate(vertices, faces, lifted.face, lifted.barycentric))
-        # Of either sign: a surface may be wound inward, and a ray's first hit is visible all the same.
-        facing.append(np.where(hit, np.abs(normals[lifted.face] @ camera.R[2]), 0.0))
-        seen[lifted.face[hit]] = True
-    shape = (len(points), N_LANDMARKS)
-    return Sightings(
-        np.reshape(points, (*shape, 3)), np.reshape(facing, shape), np.flatnonzero(seen), len(cameras) - len(points)
-    )
+        for number, looks in enumerate(wardrobe):
+            picture = {"normals": of_vertices, "unlit": unlit and looks is not CLAY_LOOKS, "hits": hits}
+            image, _ = render_with_hits(vertices, faces, camera, **vars(looks), **picture)
+            pixels = detect_both_ways(image)
+            if pixels is None:
+                continue
+            lifted = cast_pixels(scene, camera, pixels)
+            hit = lifted.face >= 0
+            points[number].append(interpolate(vertices, faces, lifted.face, lifted.barycentric))
+            # Of either sign: a surface may be wound inward, and a ray's first hit is visible all the same.
+            facing[number].append(np.where(hit, np.abs(of_faces[lifted.face] @ camera.R[2]), 0.0))
+            seen[lifted.face[hit]] = True
+    seen = np.flatnonzero(seen)
+    shapes = [(len(views), N_LANDMARKS) for views in points]
+    return [
+        Sightings(np.reshape(p, (*shape, 3)), np.reshape(f, shape), seen, len(cameras) - len(p))
+        for p, f, shape in zip(points, facing, shapes)
+    ]
 
 
 def geometric_median(points, weights, iterations=30):
@@ -196,7 +196,7 @@ def lift_landmarks(
         wardrobe.append(Looks(texture, uv, uv_faces, colors))
     if clay or not wardrobe:
         wardrobe.append(CLAY_LOOKS)
-    sightings = join_sightings([sight_landmarks(vertices, faces, looks, cameras, unlit=unlit) for looks in wardrobe])
+    sightings = join_sightings(sight_landmarks(vertices, faces, wardrobe, cameras, unlit=unlit))
     return fuse_sightings(vertices, faces, sightings)
 
 

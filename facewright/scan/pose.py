@@ -1,0 +1,279 @@
+"""find_landmarks: where the face is on a scan, which way it looks, how large its unit is, and whether its texture
+coordinates stand upright. The answer is a scan in our frame with landmarks on its faces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from facewright.conventions import INTERPUPILLARY_MM, MM_PER_UNIT
+from facewright.data import Landmarks, Scan
+from facewright.errors import InputError
+from facewright.mesh.render import srgb_to_linear
+from facewright.scan.clean import far_components, keep_faces, turn_faces
+from facewright.scan.detector import CANTHI_LEFT, CANTHI_RIGHT, LANDMARK_NAMES
+from facewright.scan.landmark_files import landmark_index, place_landmarks
+from facewright.scan.landmarks import (
+    CLAY_LOOKS,
+    STABLE,
+    VIEWS,
+    Looks,
+    face_cameras,
+    fuse_sightings,
+    join_sightings,
+    sight_landmarks,
+)
+from facewright.scan.orientation import (
+    BELIEVED_MM,
+    fit_canonical,
+    search_faces,
+    search_frame,
+    transform,
+)
+
+QUICK_VIEWS = ((-20.0, 0.0), (0.0, -15.0), (0.0, 0.0), (0.0, 15.0), (20.0, 0.0))
+FLIP_VIEWS = ((-15.0, 0.0), (0.0, 0.0), (15.0, 0.0))
+# A human head's distance between the pupils lies within these, mm.
+PLAUSIBLE_IPD_MM = (45.0, 75.0)
+# Pieces further than this from every landmark are no part of the head, mm.
+HEAD_REACH_MM = 150.0
+AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
+
+
+@dataclass(frozen=True)
+class LandmarkOptions:
+    """How find_landmarks reads a scan.
+
+    up         axis of the file that points up: "x", "y", "z", "-x", "-y" or "-z"; None: found
+    units      "mm", "cm", "dm", "m", "inch": the file's unit; None: the format's, else found
+    mirror     the scan is a mirror image: turn it back (never done unasked)
+    landmarks  name -> (3,) point in file coordinates or (face, barycentric), as read_landmarks gives; these win
+    """
+
+    up: str | None = None
+    units: str | None = None
+    mirror: bool = False
+    landmarks: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FoundFace:
+    """A scan in our frame with its landmarks.
+
+    scan             in our frame, mm; texture coordinates turned upright; T_ours_to_scan leads back to the file
+    landmarks        "mp0".."mp477" on scan.faces
+    T_scan_to_ours   (4, 4) similarity: x_ours = T x_file (mirroring only where options.mirror says so)
+    unit_mm          millimetres per unit of the file
+    unit_source      "given", "format", "found" or "assumed"
+    uv_flipped       the file's V ran downward and was turned
+    warnings         sentences for the report
+    stats            residual_mm against the canonical face, ipd_mm, agreement of the views, and the like
+    """
+
+    scan: Scan
+    landmarks: Landmarks
+    T_scan_to_ours: np.ndarray
+    unit_mm: float
+    unit_source: str
+    uv_flipped: bool
+    warnings: tuple[str, ...]
+    stats: dict[str, Any]
+
+
+def find_landmarks(scan, options=LandmarkOptions()):
+    """The face on a clean scan (see clean_scan): FoundFace.
+
+    Any orientation, position and unit, textured, coloured or in clay; the result does not depend on them.
+    raises InputError where there is no face
+    """
+    _check_options(options)
+    scan = _mirrored(scan) if options.mirror else scan
+    T, warnings = _stand_up(scan, options)
+    standing = scan.transformed(T)
+    flipped = _is_upside_down(standing)
+    if flipped:
+        scan, standing = _with_uv_flipped(scan), _with_uv_flipped(standing)
+        warnings.append("the texture was upside down (V of the file runs downward); it was turned")
+    wardrobe = wardrobe_of(standing)
+    for views in (QUICK_VIEWS, VIEWS):
+        landmarks, T, residual = _look_again(scan, T, wardrobe, views)
+    landmarks = place_landmarks(landmarks, options.landmarks, scan.transformed(T))
+    T = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights).T
+    ipd = _pupil_distance(scan, landmarks)
+    unit_mm, source, more = choose_unit(ipd, scan.unit_mm, MM_PER_UNIT.get(options.units))
+    T = _rescaled(T, unit_mm)
+    aligned = scan.transformed(T)
+    stats = {
+        "residual_mm": residual,
+        "ipd_mm": float(ipd * unit_mm),
+        "agreement": float(landmarks.weights[list(STABLE)].mean()),
+    }
+    aligned, landmarks, dropped = _head_only(aligned, landmarks)
+    if dropped:
+        more = [*more, f"dropped pieces of {dropped} faces far from the face"]
+    to_ours = np.linalg.inv(aligned.T_ours_to_scan)
+    return FoundFace(aligned, landmarks, to_ours, unit_mm, source, flipped, tuple(warnings + more), stats)
+
+
+def _check_options(options):
+    if options.up is not None and options.up.lower() not in AXES:
+        raise InputError(f"unknown up axis {options.up!r}; give one of {', '.join(AXES)}")
+    if options.units is not None and options.units not in MM_PER_UNIT:
+        raise InputError(f"unknown unit {options.units!r}; give one of {', '.join(MM_PER_UNIT)}")
+
+
+def _mirrored(scan):
+    turned = turn_faces(scan.transformed(np.diag([-1.0, 1.0, 1.0, 1.0])), np.ones(len(scan.faces), bool))
+    return replace(turned, notes=(*turned.notes, "mirrored as asked"))
+
+
+def wardrobe_of(scan):
+    """The Looks in which a scan is shown to the landmarker: as it is, if it has texture or colours, and in clay."""
+    looks = [_worn(scan)] if scan.has_texture or scan.colors is not None else []
+    return [*looks, CLAY_LOOKS]
+
+
+def _worn(scan):
+    """Looks of a textured or coloured scan. Several textures are carried to colours at the vertices."""
+    if scan.has_texture:
+        return Looks(scan.textures[0], scan.uv, scan.uv_faces)
+    return Looks(colors=srgb_to_linear(scan.colors))
+
+
+def _stand_up(scan, options):
+    """T (4, 4) that roughly brings the scan into our frame at 63 mm between the eyes, and warnings."""
+    by_hand = _stand_by_hand(scan, options.landmarks)
+    if by_hand is not None:
+        return by_hand, []
+    to_search = search_frame(scan.vertices, scan.faces)
+    vertices = transform(to_search, scan.vertices)
+    up = None if options.up is None else np.array(AXES[options.up.lower()], float) * [-1 if options.mirror else 1, 1, 1]
+    doubtful = []
+    for looks in reversed(wardrobe_of(scan)):  # clay first: it cannot lie upside down
+        for guess in search_faces(vertices, scan.faces, looks, up=up):
+            if guess.residual_mm > BELIEVED_MM:
+                doubtful.append((guess.residual_mm, looks, guess))
+            elif (T := _confirmed(vertices, scan.faces, looks, guess)) is not None:
+                return T @ to_search, []
+    doubtful.sort(key=lambda entry: entry[0])
+    for _, looks, guess in doubtful[:4]:
+        if (T := _confirmed(vertices, scan.faces, looks, guess)) is not None:
+            return T @ to_search, ["the face was hard to find; check the landmarks"]
+    raise InputError(
+        f"{scan.name}: no face was found on it; check that it is a head, or give a few landmarks with --landmarks"
+    )
+
+
+def _stand_by_hand(scan, overrides):
+    """As _stand_up from the user's landmarks, where at least four of lips, eyes and nose are given; else None."""
+    points, weights = np.zeros((len(LANDMARK_NAMES), 3)), np.zeros(len(LANDMARK_NAMES))
+    to_now = np.linalg.inv(scan.T_ours_to_scan)
+    for name, value in overrides.items():
+        index = landmark_index(name)
+        if index in STABLE and not isinstance(value, tuple):
+            points[index], weights[index] = to_now[:3, :3] @ value + to_now[:3, 3], 1.0
+    return fit_canonical(points, weights).T if weights.sum() >= 4 else None
+
+
+def _confirmed(vertices, faces, looks, guess):
+    """The frame of a guess after a second look from five sides, or None where they do not agree on a face."""
+    standing = transform(guess.T, vertices)
+    sightings = sight_landmarks(standing, faces, [looks], face_cameras(QUICK_VIEWS))[0]
+    if sightings.missed > 1:
+        return None
+    landmarks = fuse_sightings(standing, faces, sightings)
+    found = fit_canonical(landmarks.positions(standing, faces), landmarks.weights)
+    turned = np.degrees(
+        np.arccos(np.clip((np.trace(found.T[:3, :3]) / np.cbrt(np.linalg.det(found.T[:3, :3])) - 1) / 2, -1, 1))
+    )
+    if found.residual_mm > BELIEVED_MM or turned > 35.0 or landmarks.weights[list(STABLE)].mean() < 0.4:
+        return None
+    return found.T @ guess.T
+
+
+def _is_upside_down(standing):
+    """Whether the texture fits the shape only with V turned: its landmarks are held against the clay's.
+
+    The pictures are unlit, so that nothing but the texture speaks.
+    """
+    if not standing.has_texture:
+        return False
+    flipped = _with_uv_flipped(standing)
+    wardrobe = [CLAY_LOOKS, _worn(standing), _worn(flipped)]
+    cameras = face_cameras(FLIP_VIEWS)
+    clay, upright, turned = sight_landmarks(standing.vertices, standing.faces, wardrobe, cameras, unlit=True)
+    if not len(clay.points):
+        return False
+    stable = list(STABLE)
+    reference = np.median(clay.points, axis=0)[stable]
+
+    def misfit(sightings):
+        if sightings.missed:
+            return np.inf
+        return float(np.median(np.linalg.norm(np.median(sightings.points, axis=0)[stable] - reference, axis=1)))
+
+    return misfit(turned) < 0.5 * misfit(upright)
+
+
+def _with_uv_flipped(scan):
+    normals = scan.normal_map
+    return replace(scan, uv=scan.uv * [1.0, -1.0] + [0.0, 1.0], normal_map=normals)
+
+
+def _look_again(scan, T, wardrobe, views):
+    """Landmarks from views about the face in the frame T, the frame they give, and their residual (mm)."""
+    standing = transform(T, scan.vertices)
+    sightings = sight_landmarks(standing, scan.faces, wardrobe, face_cameras(views))
+    landmarks = fuse_sightings(standing, scan.faces, join_sightings(sightings))
+    guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
+    return landmarks, guess.T, guess.residual_mm
+
+
+def _pupil_distance(scan, landmarks):
+    """Distance between the middles of the two eyes (of their canthi), in the scan's present unit."""
+    points = landmarks.positions(scan.vertices, scan.faces)
+    return float(np.linalg.norm(points[list(CANTHI_LEFT)].mean(axis=0) - points[list(CANTHI_RIGHT)].mean(axis=0)))
+
+
+def choose_unit(ipd, format_mm=None, given_mm=None):
+    """Millimetres per unit of a file in which the eyes are ipd units apart: (unit_mm, source, warnings).
+
+    given_mm by the user, always believed; format_mm, believed if it makes a human head; else the unit among mm, cm,
+    dm, m and inch that does; else 63 mm between the eyes.
+    """
+    low, high = PLAUSIBLE_IPD_MM
+    if given_mm is not None:
+        return given_mm, "given", []
+    if format_mm is not None and low <= ipd * format_mm <= high:
+        return format_mm, "format", []
+    warnings = []
+    if format_mm is not None:
+        warnings.append(f"the format's unit would put the eyes {ipd * format_mm:.4g} mm apart; it was not believed")
+    fitting = [value for value in MM_PER_UNIT.values() if low <= ipd * value <= high]
+    if fitting:
+        return min(fitting, key=lambda value: abs(ipd * value - INTERPUPILLARY_MM)), "found", warnings
+    warnings.append("no unit makes this a human head; it was scaled to 63 mm between the eyes (give --units)")
+    return INTERPUPILLARY_MM / ipd, "assumed", warnings
+
+
+def _rescaled(T, unit_mm):
+    """T with another scale; what lies at our origin stays there."""
+    scale = np.cbrt(np.linalg.det(T[:3, :3]))
+    scaled = T.copy()
+    scaled[:3] *= unit_mm / scale
+    return scaled
+
+
+def _head_only(scan, landmarks):
+    """The scan and its landmarks without pieces far from the face, and how many faces went."""
+    used = landmarks.weights > 0
+    reach = HEAD_REACH_MM
+    far = far_components(scan, landmarks.positions(scan.vertices, scan.faces)[used], reach=reach)
+    if not far.any():
+        return scan, landmarks, 0
+    place = np.cumsum(~far) - 1
+    kept = replace(landmarks, faces=place[landmarks.faces])
+    return keep_faces(scan, ~far), kept, int(far.sum())
