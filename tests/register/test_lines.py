@@ -1,0 +1,41 @@
+import numpy as np
+
+from facewright.register.lines import CreaseOptions, arc_fractions, resample_line, trace_crease
+
+
+def grooved_sheet(height, depth=1.5, width=1.2, span=24.0, step=0.5):
+    """A sheet in the x-y plane with a groove along y = height(x) for |x| < span."""
+    x, y = np.meshgrid(np.arange(-40, 40, step), np.arange(-20, 20, step))
+    z = -depth * np.exp(-(((y - height(x)) / width) ** 2)) * (np.abs(x) < span)
+    V = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    i = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = i[:-1, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, 1:].ravel(), i[1:, :-1].ravel()
+    return V, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def wave(x):
+    return 2.0 * np.cos(x / 12.0)
+
+
+def test_the_groove_is_found_from_a_line_two_millimetres_off():
+    V, F = grooved_sheet(wave)
+    x = np.linspace(-22, 22, 30)
+    start = np.stack([x, wave(x) + 2.0, 0 * x], axis=1)
+    crease = trace_crease(V, F, start, np.array([0.0, 0.0, 1.0]))
+    inner = crease.points[np.abs(crease.points[:, 0]) < 20]
+    assert crease.found
+    assert np.abs(inner[:, 1] - wave(inner[:, 0])).max() < 0.4
+    assert abs(crease.points[0, 0] + 24) < 1.5 and abs(crease.points[-1, 0] - 24) < 1.5
+
+
+def test_a_flat_sheet_has_no_crease():
+    V, F = grooved_sheet(wave, depth=0.0)
+    x = np.linspace(-22, 22, 30)
+    start = np.stack([x, 0 * x, 0 * x], axis=1)
+    assert not trace_crease(V, F, start, np.array([0.0, 0.0, 1.0]), CreaseOptions()).found
+
+
+def test_resampling_by_arc_length():
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0]])
+    assert np.allclose(arc_fractions(line), [0, 1 / 3, 1])
+    assert np.allclose(resample_line(line, [0, 0.5, 1])[:, 0], [0, 1.5, 3])
