@@ -51,7 +51,8 @@ def find_crease(vertices, faces, corner_right, corner_left, *, stations=61, marg
     sections = _fan(np.asarray(corner_right, float), np.asarray(corner_left, float), np.asarray(up, float))
     origins, outward, upward, across = sections(np.linspace(margin, 1 - margin, stations), np.zeros(stations))
     tilt = np.array([_tilt(_profile(scene, *frame)) for frame in zip(origins, outward, upward)])
-    tilt = median_filter(tilt, 15, mode="nearest")
+    t = np.linspace(-1, 1, stations)
+    tilt = np.polyval(np.polyfit(t, median_filter(tilt, 15, mode="nearest"), 2), t)
     origins, outward, upward, across = sections(np.linspace(margin, 1 - margin, stations), tilt)
     found = [_locate(_profile(scene, *frame)) for frame in zip(origins, outward, upward)]
     height, depth, strength = np.array(found).T
