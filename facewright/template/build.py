@@ -1,0 +1,260 @@
+"""Build a Template from an official folder of OBJ files in one topology and a description of it (docs/template.md)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from facewright.conventions import ARKIT_SHAPES
+from facewright.data import Landmarks, Template
+from facewright.errors import InputError
+from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.polygons import triangulated
+from facewright.template import rules
+from facewright.template.assemble import assemble, fit_sphere
+from facewright.template.lines import feature_lines, find_loops
+from facewright.template.regions import Head, skin_openness, skin_regions, still_region
+from facewright.template.skeleton import head_skeleton
+from facewright.template.source import read_description, read_source_mesh, read_source_vertices
+from facewright.template.symmetry import mirror_map, symmetrized
+
+
+def build_template(source_folder, description_path):
+    """The Template that a description makes of a source folder.
+
+    raises   InputError for files that are missing or of another mesh; StageError where no line or region is found
+    """
+    folder = Path(source_folder)
+    description = read_description(description_path)
+    unit = float(description["source"]["unit_mm"])
+    neutral = read_source_mesh(folder / description["source"]["neutral"])
+    source_shapes = _read_shapes(folder, description, neutral.vertices, unit)
+    shaped = assemble(description, neutral, unit, source_shapes)
+
+    vertices = shaped.vertices - _origin(shaped)
+    groups, twin_groups = shaped.groups
+    mirror = mirror_map(vertices, shaped.polygons, groups=groups, twin_groups=twin_groups)
+    vertices = symmetrized(vertices, mirror)
+    names, deltas = _arkit(description, source_shapes, shaped.origin)
+    deltas = rules.symmetric_shapes(names, deltas, mirror)
+    identity = _read_identity(folder, description, neutral.vertices, unit)[:, shaped.origin]
+
+    head = _head(shaped, vertices, mirror)
+    stops = _source_stops(description, shaped)
+    loops = find_loops(head, skin_openness(head))
+    lines = feature_lines(head, loops, stops)
+    vertices, identity = _closed_lips(description, shaped, vertices, identity, head, lines)
+    head = _head(shaped, vertices, mirror)
+    openness = skin_openness(head)
+    regions = skin_regions(head, openness, loops, lines)
+
+    deltas = _shape_rules(description, shaped, vertices, names, deltas, head)
+    identity = _even_eyes(shaped, vertices, identity, head)
+    regions = _whole_head(regions, len(vertices)) | {"skull": _skull(shaped, deltas, vertices)}
+    faces, _ = triangulated(shaped.polygons)
+    uv_faces, _ = triangulated(shaped.uv_polygons)
+    skeleton, skin_weights = head_skeleton(vertices, faces, shaped, deltas[names.index("jawOpen")], regions, head.eyes)
+    return Template(
+        vertices=vertices,
+        faces=faces,
+        polygons=shaped.polygons,
+        uv=shaped.uv,
+        uv_faces=uv_faces,
+        uv_polygons=shaped.uv_polygons,
+        mirror=mirror,
+        parts=shaped.parts,
+        regions=regions,
+        lines=lines,
+        landmarks=_landmarks(folder, description, shaped, faces, mirror),
+        shape_names=names,
+        deltas=deltas,
+        identity_basis=identity,
+        openness=np.concatenate([openness, np.ones(len(vertices) - len(openness))]),
+        skeleton=skeleton,
+        skin_weights=skin_weights,
+        materials=description["materials"],
+        info=dict(description["info"]) | {"rules": sorted(description.get("rules", {}))},
+    )
+
+
+def _read_shapes(folder, description, neutral, unit):
+    """source name -> (n, 3) deltas in mm of every source shape that the description uses."""
+    shapes = description["shapes"]
+    wanted = []
+    for name in ARKIT_SHAPES:
+        if name not in shapes.get("made_by_rule", []):
+            wanted.extend(_sources_of(name, shapes))
+    pattern = description["source"]["shape"]
+    n = len(neutral)
+    return {
+        name: (read_source_vertices(folder / pattern.replace("*", name), n) - neutral) * unit
+        for name in dict.fromkeys(wanted)
+    }
+
+
+def _sources_of(name, shapes):
+    """Names of the source shapes that add up to an ARKit shape."""
+    if name in shapes.get("sums", {}):
+        return shapes["sums"][name]
+    for side in ("Left", "Right"):
+        if name.endswith(side) and name not in ("jawLeft", "jawRight", "mouthLeft", "mouthRight"):
+            return [name[: -len(side)] + shapes.get(side.lower(), side)]
+    return [name]
+
+
+def _arkit(description, source_shapes, origin):
+    """ARKIT_SHAPES and their deltas (52, n, 3); zero where a rule makes them later."""
+    deltas = np.zeros((len(ARKIT_SHAPES), len(origin), 3))
+    for row, name in enumerate(ARKIT_SHAPES):
+        if name not in description["shapes"].get("made_by_rule", []):
+            deltas[row] = sum(source_shapes[source] for source in _sources_of(name, description["shapes"]))[origin]
+    return ARKIT_SHAPES, deltas
+
+
+def _read_identity(folder, description, neutral, unit):
+    """(i, n, 3) identity modes of the source, mm per standard deviation; (0, n, 3) if the description has none."""
+    pattern = description["source"].get("identity")
+    paths = sorted(folder.glob(pattern)) if pattern else []
+    if pattern and not paths:
+        raise InputError(f"template source: no file {pattern} in {folder}; is this the official folder?")
+    modes = np.empty((len(paths), len(neutral), 3))
+    for row, path in zip(modes, paths):
+        row[:] = (read_source_vertices(path, len(neutral)) - neutral) * unit
+    return modes
+
+
+def _origin(shaped):
+    """Midway between the eyeballs' centres."""
+    left = fit_sphere(shaped.vertices[shaped.part("eye_left").vertex_slice])[0]
+    right = fit_sphere(shaped.vertices[shaped.part("eye_right").vertex_slice])[0]
+    return 0.5 * (left + right)
+
+
+def _head(shaped, vertices, mirror):
+    """The skin and its surroundings as the finders of regions and lines take it."""
+    left = shaped.part("eye_left")
+    center, radius = fit_sphere(vertices[left.vertex_slice])
+    tongue = vertices[shaped.part("tongue").vertex_slice]
+    skin = shaped.parts[0].vertex_slice
+    balls = [_part_mesh(shaped, vertices, part) for part in shaped.parts if part.name.startswith(("eye_", "cornea_"))]
+    offsets = np.cumsum([0] + [len(points) for points, _ in balls])
+    return Head(
+        vertices=vertices[skin],
+        polygons=shaped.polygons[shaped.skin_polygons],
+        mirror=mirror[skin],
+        eyes=np.stack([center, center * [-1, 1, 1]]),
+        eye_radius=radius,
+        mouth=tongue.mean(axis=0) * [0, 1, 1],
+        balls=(
+            np.vstack([points for points, _ in balls]),
+            np.vstack([faces + start for (_, faces), start in zip(balls, offsets)]),
+        ),
+    )
+
+
+def _part_mesh(shaped, vertices, part):
+    faces, _ = triangulated(shaped.polygons)
+    return vertices[part.vertex_slice], faces[part.face_slice] - part.vertices[0]
+
+
+def _source_stops(description, shaped):
+    """Stops of lines, given as source vertices, in the template's order."""
+    place = {int(source): index for index, source in reversed(list(enumerate(shaped.origin)))}
+    return {name: [place[v] for v in stops] for name, stops in description.get("lines", {}).items()}
+
+
+def _closed_lips(description, shaped, vertices, identity, head, lines):
+    """Neutral and identity modes whose paired lip points coincide, each lip moved half the way."""
+    options = description.get("rules", {}).get("close_lips")
+    if not options:
+        return vertices, identity
+    upper, lower = lines["lip_seam_upper"][1:-1], lines["lip_seam_lower"][1:-1]
+    skin = shaped.parts[0].vertex_slice
+    spread = rules.Spread(head.vertices, head.faces, np.concatenate([upper, lower]), float(options["radius_mm"]))
+    closed, modes = vertices.copy(), identity.copy()
+    half = 0.5 * (vertices[lower] - vertices[upper])
+    closed[skin] += spread(np.concatenate([half, -half]))
+    for mode in modes:
+        half = 0.5 * (mode[lower] - mode[upper])
+        mode[skin] += spread(np.concatenate([half, -half]))
+    return symmetrized_skin(closed, head, skin), modes
+
+
+def symmetrized_skin(vertices, head, skin):
+    """vertices with the skin made exactly symmetric again."""
+    result = vertices.copy()
+    result[skin] = symmetrized(vertices[skin], head.mirror)
+    return result
+
+
+def _shape_rules(description, shaped, vertices, names, deltas, head):
+    """Deltas with turning eyes and a tongue that comes out, as the description asks."""
+    options = description.get("rules", {})
+    deltas = deltas.copy()
+    if "turn_eyes" in options:
+        for side, center in zip(("Left", "Right"), head.eyes):
+            moved = [part for part in shaped.parts if part.attach == f"eye_{side.lower()}"]
+            for name, (yaw, pitch) in rules.eye_turns(side, options["turn_eyes"]).items():
+                for part in moved:
+                    s = part.vertex_slice
+                    deltas[names.index(name), s] = rules.turned(vertices[s], center, yaw, pitch)
+    if "tongue_out" in options:
+        deltas[names.index("tongueOut")] = _tongue_out(
+            options["tongue_out"], shaped, vertices, deltas[names.index("jawOpen")]
+        )
+    return deltas
+
+
+def _tongue_out(options, shaped, vertices, jaw_open):
+    """(n, 3) the tongue comes out between lips and teeth that part by a share of jawOpen."""
+    part = shaped.part("tongue")
+    points, faces = _part_mesh(shaped, vertices, part)
+    delta = float(options["jaw_open"]) * jaw_open
+    border = np.flatnonzero(border_vertices(faces, len(points)))
+    delta[part.vertex_slice] += rules.tongue_out(
+        points, faces, border, float(options["tip_mm"]), drop_deg=float(options["drop_deg"])
+    )
+    return delta
+
+
+def _even_eyes(shaped, vertices, identity, head):
+    """Identity modes in which whatever is attached to an eye keeps its roundness."""
+    identity = identity.copy()
+    for side, center in zip(("left", "right"), head.eyes):
+        chosen = np.zeros(len(vertices), bool)
+        for part in shaped.parts:
+            chosen[part.vertex_slice] |= part.attach == f"eye_{side}"
+        identity[:, chosen] = rules.even_eyes(identity[:, chosen], vertices[chosen], center)
+    return identity
+
+
+def _whole_head(regions, n):
+    """Masks of the skin as masks of all parts."""
+    return {name: np.concatenate([mask, np.zeros(n - len(mask), bool)]) for name, mask in regions.items()}
+
+
+def _skull(shaped, deltas, vertices):
+    """(n,) bool: skin that no shape moves: the back of the head and the neck."""
+    skin = np.zeros(len(vertices), bool)
+    skin[shaped.parts[0].vertex_slice] = True
+    return skin & still_region(deltas, 0.05)
+
+
+def _landmarks(folder, description, shaped, faces, mirror):
+    """68-point landmarks from a JSON list of source vertices, where the description names one."""
+    options = description.get("landmarks")
+    if not options:
+        return Landmarks((), np.empty(0), np.empty((0, 3)), np.empty(0))
+    try:
+        listed = json.loads((folder / options["file"]).read_text())[options["key"]]
+    except (OSError, KeyError, ValueError) as error:
+        raise InputError(f"template source: {options['file']} holds no list {options['key']!r}") from error
+    place = {int(source): index for index, source in reversed(list(enumerate(shaped.origin)))}
+    order = np.argsort(faces.ravel(), kind="stable")
+    first = order[np.searchsorted(faces.ravel()[order], [place[v] for v in listed])]
+    names = tuple(f"p{i + 1}" for i in range(len(listed)))
+    # The contour of the jaw (p1 to p17) is a matter of view, not of anatomy.
+    weights = np.where(np.arange(len(listed)) < 17, 0.0, 1.0)
+    return Landmarks(names, first // 3, np.eye(3)[first % 3], weights)

@@ -1,0 +1,120 @@
+"""Feature lines of a head: closed edge loops found as narrowest cuts, and chains between their ends.
+
+Lid margins, lip contact and nostril rims are where the surface is narrowest between an inside and the outside, so a
+minimum cut finds them on any mesh whose edges follow them. The red of the lips has no such cut: a description names
+a few stops of its border.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facewright.errors import StageError
+from facewright.mesh.adjacency import border_loops
+from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.raster import RayScene
+from facewright.template.loops import paired, separating_loop, shortest_path, split_loop
+from facewright.template.regions import Loops, enclosed, eye_pouch, mouth_bag, seen_from_inside
+
+
+def find_loops(head, openness):
+    """The Loops of a regions.Head; openness (n,) of its skin."""
+    lips = _mouth_loop(head)
+    return Loops(_lid_loop(head), lips, _nostril_loop(head, openness, lips))
+
+
+def feature_lines(head, loops, stops=None):
+    """name -> (k,) vertices of every canonical line of the skin; docs/template.md says what each means.
+
+    stops    line name -> vertices that it passes, for lines that cannot be found by form
+    Lines of the left side are found, those of the right are their twins, so left and right always agree.
+    """
+    stops = stops or {}
+    x, twin = head.vertices[:, 0], head.mirror
+    lid, lips = loops.lid, loops.lips
+    upper, lower = _upper_first(head, *split_loop(lid, lid[np.argmin(x[lid])], lid[np.argmax(x[lid])]))
+    corner = lips[np.argmax(x[lips])]
+    lip_upper, lip_lower = paired(*_upper_first(head, *split_loop(lips, twin[corner], corner)))
+    lines = {"lip_seam_upper": lip_upper, "lip_seam_lower": lip_lower}
+    for name in ("lip_outer_upper", "lip_outer_lower"):
+        if name in stops:
+            lines[name] = shortest_path(head.vertices, head.polygons, stops[name])
+    lines |= {"lid_upper_left": upper, "lid_lower_left": lower}
+    lines |= {"lid_upper_right": twin[upper], "lid_lower_right": twin[lower]}
+    lines |= {"nostril_left": loops.nostril, "nostril_right": twin[loops.nostril]}
+    borders = border_loops(head.faces)
+    if borders:
+        lines["neck_ring"] = borders[0]
+    return lines
+
+
+def _upper_first(head, first, second):
+    y = head.vertices[:, 1]
+    return (first, second) if y[first].mean() > y[second].mean() else (second, first)
+
+
+def _all_corners(mask, polygons):
+    """(p,) bool: polygons all of whose corners are in a vertex mask."""
+    return (mask[polygons] | (polygons < 0)).all(axis=1)
+
+
+def _lid_loop(head):
+    far = np.linalg.norm(head.vertices - head.eyes[0], axis=1) > 45 * head.scale
+    return separating_loop(
+        head.vertices, head.polygons, _all_corners(eye_pouch(head), head.polygons), _all_corners(far, head.polygons)
+    )
+
+
+def _mouth_loop(head):
+    """Edges where the two lips are near each other are cheap, so that the line of contact wins over other rings."""
+    bag = mouth_bag(head)
+    opening = np.array([0.0, head.mouth[1], head.vertices[bag, 2].max() + 15 * head.scale])
+    far = ~seen_from_inside(head, head.mouth, 90 * head.scale)
+    far &= np.linalg.norm(head.vertices - opening, axis=1) > 50 * head.scale
+    gap = np.minimum(_gap_ahead(head), 4 * head.scale)
+    return separating_loop(
+        head.vertices,
+        head.polygons,
+        _all_corners(bag, head.polygons),
+        _all_corners(far, head.polygons),
+        edge_factor=lambda edges: 0.3 + gap[edges].mean(axis=1),
+    )
+
+
+def _gap_ahead(head):
+    """(n,) mm from each vertex to the next skin in front of it: the least over a cone about the normal."""
+    normals = vertex_normals(head.vertices, head.faces)
+    scene = RayScene(head.vertices, head.faces)
+    gap = np.full(len(head.vertices), np.inf)
+    for tilt in np.vstack([np.zeros((1, 3)), 0.35 * np.eye(3), -0.35 * np.eye(3)]):
+        gap = np.minimum(gap, scene.cast(head.vertices + 0.05 * normals, normalized(normals + tilt)).distance)
+    return gap
+
+
+def _nostril_loop(head, openness, lips):
+    """The left nostril's rim runs between its dark inside and the light, where openness is about a half."""
+    v, scale = head.vertices, head.scale
+    blocked = enclosed(head.polygons, len(v), lips, mouth_bag(head))
+    tip = _nose_tip(head, openness)
+    around = np.linalg.norm(v - tip - np.array([0, -5, -10]) * scale, axis=1) < 24 * scale
+    dark = around & ~blocked & (openness < 0.2) & (v[:, 0] > 0)
+    bright = (openness > 0.75) | ~around | (v[:, 0] < 0)
+    if not _all_corners(dark, head.polygons).any():
+        raise StageError("template", "no_nostril", "no dark pit was found beneath the nose tip")
+    return separating_loop(
+        v,
+        head.polygons,
+        _all_corners(dark, head.polygons),
+        _all_corners(bright & ~dark, head.polygons),
+        edge_factor=lambda edges: 0.15 + 3 * (2 * openness[edges].mean(axis=1) - 0.9) ** 2,
+    )
+
+
+def _nose_tip(head, openness):
+    """(3,) the foremost open midline point below the eyes and above the mouth."""
+    v = head.vertices
+    between = head.midline & (openness > 0.6) & (v[:, 1] < head.eyes[:, 1].mean()) & (v[:, 1] > head.mouth[1])
+    if not between.any():
+        raise StageError("template", "no_nose", "no open midline vertex lies between eyes and mouth")
+    index = np.flatnonzero(between)
+    return v[index[np.argmax(v[index, 2])]]

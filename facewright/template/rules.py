@@ -1,0 +1,116 @@
+"""What a template lacks, made by rule: eyes that turn, a tongue that comes out, lips that meet, even sides.
+
+Every rule takes arrays and gives new ones; a description file switches it on (docs/template.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from facewright.conventions import mirrored_name
+from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass, uniform_laplacian
+from facewright.solve.quadratic import Factorization
+from facewright.template.symmetry import mirrored_field
+
+
+class Spread:
+    """Carries displacements of a few handle vertices smoothly into their surroundings.
+
+    Minimises |M^-1/2 L u|^2 (biharmonic) with u given at handles and 0 farther than radius mm from them.
+
+    vertices (n, 3) mm, faces (m, 3), handles (k,) indices, free (n,) bool or None: vertices that may move at all
+    """
+
+    def __init__(self, vertices, faces, handles, radius, *, free=None):
+        n = len(vertices)
+        self.handles = np.asarray(handles)
+        near = cKDTree(vertices[self.handles]).query(vertices, distance_upper_bound=radius)[0] < radius
+        if free is not None:
+            near &= free
+        near[self.handles] = False
+        self.inner = np.flatnonzero(near)
+        L = cotangent_laplacian(vertices, faces)
+        mass = np.maximum(lumped_mass(vertices, faces), 1e-2)
+        B = (L @ sp.diags(1.0 / mass) @ L).tocsr()
+        # A breath of the graph Laplacian keeps slivers at the mouth corners from swinging.
+        B = B + 1e-4 * uniform_laplacian(faces, n)
+        self._cross = B[self.inner][:, self.handles]
+        self._factor = Factorization(B[self.inner][:, self.inner])
+        self._n = n
+
+    def __call__(self, displacements):
+        """(n, 3) field of displacements (k, 3) at the handles."""
+        field = np.zeros((self._n, 3))
+        field[self.handles] = displacements
+        field[self.inner] = self._factor.solve(-(self._cross @ displacements))
+        return field
+
+
+def symmetric_shapes(names, deltas, mirror):
+    """Deltas (s, n, 3) in which each Left is the exact mirror image of its Right, and middle shapes of themselves."""
+    index = {name: i for i, name in enumerate(names)}
+    twins = [index[mirrored_name(name)] for name in names]
+    return 0.5 * (deltas + mirrored_field(deltas[twins], mirror))
+
+
+def turned(vertices, center, yaw_deg, pitch_deg):
+    """Displacements (k, 3) of vertices turned about a centre: yaw > 0 looks to +X, pitch > 0 up."""
+    yaw, pitch = np.radians(yaw_deg), np.radians(pitch_deg)
+    cy, sy, cp, sp_ = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, sp_], [0, -sp_, cp]])
+    return (vertices - center) @ (about_y @ about_x).T + center - vertices
+
+
+def eye_turns(side, degrees):
+    """shape name -> (yaw, pitch) in degrees for the eye of a side; degrees = dict(out, inward, up, down)."""
+    outward = 1.0 if side == "Left" else -1.0
+    return {
+        f"eyeLookOut{side}": (outward * degrees["out"], 0.0),
+        f"eyeLookIn{side}": (-outward * degrees["inward"], 0.0),
+        f"eyeLookUp{side}": (0.0, degrees["up"]),
+        f"eyeLookDown{side}": (0.0, -degrees["down"]),
+    }
+
+
+def tongue_out(vertices, faces, border, tip_mm, *, drop_deg=28.0):
+    """Displacements (k, 3) that bring a tongue out: root and border stay, the tip goes tip_mm forward in an arc.
+
+    vertices (k, 3) mm and faces of the tongue alone; border (b,) indices that are held, where it joins the gums
+    The way forward f grows smoothly from the root to the tip; the arc bends down by drop_deg at the tip.
+    """
+    z = vertices[:, 2]
+    root, tip = z.min(), z.max()
+    t = np.clip((z - root) / (tip - root), 0.0, 1.0)
+    share = _held_share(vertices, faces, border, t)
+    forward = share * tip_mm
+    bend = np.radians(drop_deg) * share**2
+    radius_part = forward * np.cos(bend)
+    drop = -forward * np.sin(bend)
+    return np.stack([np.zeros(len(z)), drop, radius_part], axis=1)
+
+
+def _held_share(vertices, faces, border, t):
+    """(k,) 0 at the border and near the root, 1 at the tip: harmonic between, so that the surface stretches evenly."""
+    L = cotangent_laplacian(vertices, faces)
+    held = np.zeros(len(vertices), bool)
+    held[border] = True
+    held |= t < 0.08
+    front = (t > 0.93) & ~held
+    fixed = held | front
+    value = np.where(front, 1.0, 0.0)
+    inner, outer = np.flatnonzero(~fixed), np.flatnonzero(fixed)
+    value[inner] = Factorization(L[inner][:, inner]).solve(-(L[inner][:, outer] @ value[outer]))
+    return np.clip(value, 0.0, 1.0)
+
+
+def even_eyes(modes, vertices, center):
+    """Identity modes (i, k, 3) of an eyeball replaced by their best move and even scale, so it stays a sphere."""
+    offset = vertices - center
+    move = modes.mean(axis=1, keepdims=True)
+    mean_offset = offset.mean(axis=0)
+    spread = offset - mean_offset
+    grow = np.einsum("ikc,kc->i", modes - move, spread) / np.einsum("kc,kc->", spread, spread)
+    return move + grow[:, None, None] * spread
