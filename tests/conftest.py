@@ -73,3 +73,81 @@ def small_rig():
 def triangles(polygons):
     """Polygons (p, 4), -1 padded, as triangles."""
     return np.vstack([polygons[:, :3], polygons[polygons[:, 3] >= 0][:, [0, 2, 3]]])
+
+
+BALL_RADIUS_MM = 80.0
+
+
+@pytest.fixture(scope="session")
+def ball_face():
+    """A Face whose head is a ball of 80 mm: its front lies in the middle of one octahedral chart, and a patch below
+    the front pole is the inner mouth. Mirror-exact, 40 x 40 quads, no shapes.
+    """
+    directions, polygons, uv, uv_polygons = octahedral_sphere(40)
+    vertices = BALL_RADIUS_MM * directions
+    mirror = np.array([np.abs(vertices - vertex * [-1, 1, 1]).sum(axis=1).argmin() for vertex in vertices])
+    inside = (np.linalg.norm(vertices[:, :2] - [0, -35], axis=1) < 14) & (vertices[:, 2] > 0)
+    everywhere = np.ones(len(vertices), bool)
+    regions = {"skin": everywhere, "outer": ~inside, "mouth_interior": inside, "face": vertices[:, 2] > 20}
+    faces, uv_faces = triangles(polygons), triangles(uv_polygons)
+    n, m = len(vertices), len(faces)
+    template = data.Template(
+        vertices=vertices,
+        faces=faces,
+        polygons=polygons,
+        uv=uv,
+        uv_faces=uv_faces,
+        uv_polygons=uv_polygons,
+        mirror=mirror,
+        parts=(data.Part("skin", (0, n), (0, m), "skin"),),
+        regions=regions,
+        lines={},
+        landmarks=data.Landmarks((), np.zeros(0), np.zeros((0, 3)), np.zeros(0)),
+        shape_names=(),
+        deltas=np.zeros((0, n, 3)),
+        identity_basis=np.zeros((0, n, 3)),
+        openness=np.ones(n),
+        skeleton=data.Skeleton(("neck",), (-1,), np.zeros((1, 3))),
+        skin_weights=np.ones((n, 1)),
+        materials={"skin": {"color": (0.6, 0.42, 0.34), "roughness": 0.6}},
+        info={"name": "ball"},
+    )
+    closed = {"left": False, "right": False}
+    return data.Face(template, vertices, vertices, regions, {}, everywhere, {}, closed, {})
+
+
+def octahedral_sphere(k):
+    """A closed sphere of k x k quads as unit vertices (n, 3), quads, their UVs in one square chart and its quads."""
+    grid = np.stack(np.meshgrid(np.linspace(-1, 1, k + 1), np.linspace(-1, 1, k + 1)), axis=-1).reshape(-1, 2)
+    quads = np.array([[0, 1, k + 2, k + 1]]) + (np.arange(k)[:, None] * (k + 1) + np.arange(k)).reshape(-1, 1)
+    # Cut along the octahedron's edges: the other diagonal would leave a triangle without area where they meet the rim.
+    same_sign = grid[quads].mean(axis=1).prod(axis=1) > 0
+    quads[same_sign] = np.roll(quads[same_sign], 1, axis=1)
+    z = 1.0 - np.abs(grid).sum(axis=1)
+    folded = (1.0 - np.abs(grid[:, ::-1])) * np.where(grid >= 0, 1.0, -1.0)
+    directions = np.column_stack([np.where(z[:, None] >= 0, grid, folded), z])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    _, first, inverse = np.unique(np.round(directions, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    return directions[first], inverse.ravel()[quads], grid / 2 + 0.5, quads
+
+
+@pytest.fixture(scope="session")
+def ball_scan():
+    """A function that makes scans of the ball: ball_scan(color, keep=None, k=90, radius=80) -> Scan.
+
+    color  (n, 3) directions -> (n, 3) sRGB 0..1, kept per vertex; None for clay
+    keep   (m, 3) directions of face centres -> (m,) bool: what the scan has; None for all of it
+    """
+
+    def make(color, keep=None, k=90, radius=BALL_RADIUS_MM):
+        directions, quads, _, _ = octahedral_sphere(k)
+        a, b = 0.7, 0.4  # turned, so that its triangles have nothing to do with the head's
+        directions = directions @ [[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]
+        directions = directions @ [[np.cos(b), 0, -np.sin(b)], [0, 1, 0], [np.sin(b), 0, np.cos(b)]]
+        faces = triangles(quads)
+        if keep is not None:
+            centers = directions[faces].mean(axis=1)
+            faces = faces[keep(centers / np.linalg.norm(centers, axis=1, keepdims=True))]
+        return data.Scan(radius * directions, faces, colors=None if color is None else color(directions))
+
+    return make

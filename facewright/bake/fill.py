@@ -85,43 +85,45 @@ def solve_fill(V, F, regions, mirror, outer, means, share, default):
 
     twin_known = known[mirror] & outer
     guide = np.where(twin_known[:, None], means[mirror], 0.0)
-    fixed = known.copy()
-    inside = surface_distance(V, F, outer, 20.0)
+    # The skin first, then what lies behind its rims: a dark mouth must not tint a cheek that nobody saw.
+    color = _poisson(V, F, color, known, outer & ~known, guide, twin_known, skin)
+    fixed = outer.copy()
+    behind = surface_distance(V, F, outer, 20.0)
     for name, (tone, depth) in INTERIORS.items():
-        deep = regions.get(name, np.zeros(n, bool)) & ~outer & (inside >= depth)
+        deep = regions.get(name, np.zeros(n, bool)) & ~outer & (behind >= depth)
         color[deep] = skin * tone
         fixed |= deep
-    color = _poisson(V, F, color, fixed, guide, twin_known, skin)
+    color = _poisson(V, F, color, fixed, ~fixed, guide, np.zeros(n, bool), skin)
     # No detail on faces that touch an unknown twin: an edge may be longer than the ramp.
     unknown = dilate(outer & ~twin_known, F)
     detail = np.where(outer, np.clip(surface_distance(V, F, unknown, FEATHER_MM) / FEATHER_MM, 0.0, 1.0), 0.0)
     return Fill(color, weight, detail, color[mirror])
 
 
-def _poisson(V, F, color, fixed, guide, guided, rest):
-    """Solve for the colours (n, 3) of the vertices that are not fixed; rest (3,) where nothing at all is known."""
+def _poisson(V, F, color, held, free, guide, guided, rest):
+    """Solve for the colours (n, 3) of the free vertices between the held ones; others take no part.
+
+    guide (n, 3) where guided (n,); rest (3,) is the colour where nothing held is connected.
+    """
+    if not free.any():
+        return color
     n = len(V)
     edges = unique_edges(F)
+    edges = edges[(held | free)[edges].all(axis=1)]
     length = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1)
     # 1 / length makes a membrane on meshes of uneven density; cotangents go negative at slivers.
     weights = 1.0 / np.maximum(length, 1e-3)
-    gradient = sp.coo_matrix(
-        (np.repeat([[1.0, -1.0]], len(edges), axis=0).ravel(), (np.repeat(np.arange(len(edges)), 2), edges.ravel())),
-        shape=(len(edges), n),
-    ).tocsr()
-    both = guided[edges].all(1)
-    wanted = np.where(both[:, None], guide[edges[:, 0]] - guide[edges[:, 1]], 0.0)
-    A = (gradient.T @ sp.diags(weights) @ gradient).tocsr()
-    b = gradient.T @ (weights[:, None] * wanted)
-    free = np.flatnonzero(~fixed)
-    held = np.flatnonzero(fixed)
+    ones = np.tile([1.0, -1.0], len(edges))
+    difference = sp.csr_matrix((ones, edges.ravel(), np.arange(0, 2 * len(edges) + 1, 2)), shape=(len(edges), n))
+    wanted = np.where(guided[edges].all(1)[:, None], difference @ guide, 0.0)
+    A = (difference.T @ sp.diags(weights) @ difference).tocsr()
+    b = difference.T @ (weights[:, None] * wanted)
+    ridge = RIDGE * max(weights.mean() if len(weights) else 1.0, 1e-9)
+    system = A[free][:, free] + ridge * sp.identity(int(free.sum()))
+    right = b[free] - A[free][:, held] @ color[held] + ridge * rest
     result = color.copy()
-    if len(free):
-        ridge = RIDGE * weights.mean()
-        system = A[free][:, free] + ridge * sp.identity(len(free))
-        right = b[free] - A[free][:, held] @ color[held] + ridge * rest
-        result[free] = Factorization(system).solve(right)
-    return np.clip(result, 0.0, 255.0)
+    result[free] = np.clip(Factorization(system).solve(right), 0.0, 255.0)
+    return result
 
 
 def _length_graph(V, F):

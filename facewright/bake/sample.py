@@ -9,7 +9,7 @@ from facewright.mesh.adjacency import half_edges
 from facewright.mesh.normals import face_areas, normalized, vertex_normals
 from facewright.mesh.tangents import corner_tangents, from_tangent_space
 
-SEAM_MARGIN_TEXELS = 0.75
+SEAM_REACH_TEXELS = 1.5
 MAX_LEVEL = 6
 
 
@@ -30,6 +30,7 @@ class ScanLooks:
             uv_unique, uv_faces = _welded(scan.uv, scan.uv_faces)
             self.uv_corners = uv_unique[uv_faces]  # (m, 3, 2)
             self.seams = _seam_edges(uv_faces)
+            self.seam_corners = _on_seams(uv_faces, self.seams)
             flat = np.concatenate([uv_unique, np.zeros((len(uv_unique), 1))], axis=1)
             in_uv, on_surface = face_areas(flat, uv_faces), face_areas(scan.vertices, scan.faces)
             self.uv_per_mm = np.sqrt(in_uv / np.maximum(on_surface, 1e-12))  # (m,)
@@ -84,21 +85,40 @@ class ScanLooks:
     def _pixels(self, face, barycentric, scale):
         """(k, 2) positions in texels of an image of size scale (width, height), v up, kept off the seams."""
         xy = at_corners(self.uv_corners, face, barycentric).astype(np.float64) * scale
-        near = np.flatnonzero(self.seams[face].any(1))
-        for edge in range(3):
-            rows = near[self.seams[face[near], edge]]
-            a = self.uv_corners[face[rows], edge] * scale
-            b = self.uv_corners[face[rows], (edge + 1) % 3] * scale
-            c = self.uv_corners[face[rows], (edge + 2) % 3] * scale
-            along = normalized(b - a)
-            inward = np.stack([-along[:, 1], along[:, 0]], axis=1)
-            height = ((c - a) * inward).sum(1)
-            inward *= np.sign(height)[:, None]
-            inside = ((xy[rows] - a) * inward).sum(1)
-            # A triangle thinner than the margin is sampled at two thirds of its height, never beyond its tip.
-            wanted = np.minimum(SEAM_MARGIN_TEXELS, np.abs(height) * 2 / 3)
-            xy[rows] += inward * np.maximum(wanted - inside, 0.0)[:, None]
+        near = np.flatnonzero(self.seam_corners[face].any(1))
+        corners = self.uv_corners[face[near]] * scale  # (k, 3, 2)
+        at_seam, along_seam = self.seam_corners[face[near]], self.seams[face[near]]
+        moved = xy[near]
+        for i in range(3):
+            moved = _away_from_corner(moved, corners, i, at_seam[:, i])
+        for i in range(3):
+            moved = _away_from_edge(moved, corners, i, along_seam[:, i])
+        xy[near] = moved
         return xy
+
+
+def _away_from_corner(xy, corners, i, chosen):
+    """Move points (k, 2) within reach of corner i of their triangles (k, 3, 2) towards its middle."""
+    to_middle = corners.mean(axis=1) - corners[:, i]
+    length = np.linalg.norm(to_middle, axis=1)
+    reach = np.minimum(SEAM_REACH_TEXELS, length)
+    near = chosen & (np.linalg.norm(xy - corners[:, i], axis=1) < reach)
+    target = corners[:, i] + to_middle * (reach / np.maximum(length, 1e-12))[:, None]
+    return np.where(near[:, None], target, xy)
+
+
+def _away_from_edge(xy, corners, i, chosen):
+    """Move points (k, 2) off edge i -> i + 1 of their triangles (k, 3, 2), so that no texel across it is read."""
+    a, b, c = corners[:, i], corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]
+    along = normalized(b - a)
+    inward = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    height = ((c - a) * inward).sum(1)
+    inward *= np.sign(height)[:, None]
+    inside = ((xy - a) * inward).sum(1)
+    # Bilinear samples read texel centres less than one texel away in x and in y. A triangle thinner than that is
+    # sampled at two thirds of its height, never beyond its tip.
+    wanted = np.minimum(np.abs(inward).sum(axis=1), np.abs(height) * 2 / 3)
+    return xy + inward * np.where(chosen, np.maximum(wanted - inside, 0.0), 0.0)[:, None]
 
 
 def sample_pixels(image, xy):
@@ -140,3 +160,11 @@ def _seam_edges(uv_faces):
     n = int(uv_faces.max()) + 1 if len(uv_faces) else 0
     keys = edges[:, 0] * n + edges[:, 1]
     return ~np.isin(keys, edges[:, 1] * n + edges[:, 0]).reshape(-1, 3)
+
+
+def _on_seams(uv_faces, seams):
+    """(m, 3) bool: the corner is an end of a seam edge, of its own face or of another."""
+    ends = np.stack([uv_faces, np.roll(uv_faces, -1, axis=1)], axis=-1)[seams]
+    on_seam = np.zeros(int(uv_faces.max()) + 1 if len(uv_faces) else 0, bool)
+    on_seam[ends.ravel()] = True
+    return on_seam[uv_faces]

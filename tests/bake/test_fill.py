@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from facewright.bake.fill import feather, solve_fill, surface_distance
+
+
+@pytest.fixture(scope="module")
+def ball(ball_face):
+    template = ball_face.template
+    return template.vertices, template.faces, template.mirror, template.regions
+
+
+def shading(V):
+    """Colours that are the same left and right, but for a wash of light from one side."""
+    front = np.column_stack([100 + V[:, 1], 120 + 0.5 * V[:, 2], 90 + 0.3 * np.abs(V[:, 0])])
+    return front + 0.1 * V[:, :1]
+
+
+def test_distance_along_the_surface(ball):
+    V, F, _, _ = ball
+    pole = V[:, 2].argmax()
+    distance = surface_distance(V, F, np.arange(len(V)) == pole, 300.0)
+    arc = 80 * np.arccos(np.clip(V @ V[pole] / 6400, -1, 1))
+    assert (distance >= 0.99 * arc).all(), "chords are a little shorter than arcs"
+    assert (distance < 1.45 * arc + 1e-9).all(), "edges go round corners"
+    straight = np.abs(V[:, 1]) < 1e-9  # a row of edges from pole to pole
+    np.testing.assert_allclose(distance[straight], arc[straight], rtol=0.01)
+    assert (surface_distance(V, F, np.zeros(len(V), bool), 7.0) == 7.0).all()
+
+
+def test_feather_is_zero_at_holes_and_one_away_from_them_and_at_rims(ball):
+    V, F, _, regions = ball
+    share = np.where(V[:, 0] > 40, 0.0, 1.0)
+    weight = feather(V, F, regions["outer"], share)
+    assert (weight[V[:, 0] > 40] == 0).all()
+    assert (weight[(V[:, 0] < 30) & regions["outer"]] == 1).all(), "the mouth's rim is not a hole"
+    assert (weight[regions["mouth_interior"]] == 0).all()
+
+
+def test_what_is_known_stays_and_a_missing_side_repeats_the_other(ball):
+    V, F, mirror, _ = ball
+    outer = np.ones(len(V), bool)
+    colors = shading(V)
+    missing = np.linalg.norm(V - [45, 20, 60], axis=1) < 25
+    fill = solve_fill(V, F, {}, mirror, outer, colors, np.where(missing, 0.0, 1.0), (1, 2, 3))
+    far = np.linalg.norm(V - [45, 20, 60], axis=1) > 32
+    np.testing.assert_allclose(fill.color[far], colors[far], atol=1e-9)
+    # The mirrored side knows |x| and all else; the wash of light is continued from the border.
+    assert np.abs(fill.color - colors)[missing].max() < 1.0
+    plain = solve_fill(V, F, {}, np.arange(len(V)), outer, colors, np.where(missing, 0.0, 1.0), (1, 2, 3))
+    assert np.abs(plain.color - colors)[missing].max() > 2.0, "without a mirror only the border is known"
+
+
+def test_nothing_known_gives_the_default_and_dark_insides(ball):
+    V, F, mirror, regions = ball
+    share = np.zeros(len(V))
+    fill = solve_fill(V, F, regions, mirror, regions["outer"], np.zeros((len(V), 3)), share, (200, 150, 120))
+    far = regions["outer"]
+    assert np.abs(fill.color[far] - [200, 150, 120]).max() < 1e-6, "the mouth tints nothing"
+    deepest = np.linalg.norm(V[:, :2] - [0, -35], axis=1) + np.where(V[:, 2] > 0, 0, 1e3)
+    assert (fill.color[deepest.argmin()] < 0.5 * np.array([200, 150, 120])).all()
+    assert (fill.weight == 0).all()
+
+
+def test_vertices_without_texels_are_no_holes(ball):
+    V, F, mirror, _ = ball
+    outer = np.ones(len(V), bool)
+    share = np.ones(len(V))
+    share[::7] = np.nan
+    fill = solve_fill(V, F, {}, mirror, outer, shading(V), share, (1, 2, 3))
+    assert (fill.weight == 1).all()
+    assert np.abs(fill.color - shading(V)).max() < 6
