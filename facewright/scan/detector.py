@@ -15,6 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from facewright.conventions import INTERPUPILLARY_MM
+from facewright.mesh.normals import vertex_normals
+
 MODEL_PATH = Path(__file__).with_name("face_landmarker.task")
 N_LANDMARKS = 478
 LANDMARK_NAMES = tuple(f"mp{i}" for i in range(N_LANDMARKS))
@@ -104,18 +107,34 @@ def _protobuf_fields(message):
 
 
 @functools.lru_cache(maxsize=1)
+def _canonical_mesh():
+    """Positions (468, 3) in MediaPipe's own frame (cm, +Y up, +Z out) and triangles (m, 3)."""
+    with zipfile.ZipFile(MODEL_PATH) as bundle:
+        metadata = bundle.read("geometry_pipeline_metadata_landmarks.binarypb")
+    mesh = list(_protobuf_fields(dict(_protobuf_fields(metadata))[1]))
+    buffer = np.array([value for number, value in mesh if number == 3])
+    triangles = np.array([value for number, value in mesh if number == 4], dtype=np.int64)
+    return buffer.reshape(-1, 5)[:, :3], triangles.reshape(-1, 3)  # position and texture coordinates, interleaved
+
+
+@functools.lru_cache(maxsize=1)
 def canonical_landmarks():
     """(468, 3) MediaPipe's canonical face in our frame: mm, 63 mm between the eyes, origin between the eyeballs.
 
     The eyes are taken midway between their canthi. The irises (468..477) are no part of it.
     """
-    with zipfile.ZipFile(MODEL_PATH) as bundle:
-        metadata = bundle.read("geometry_pipeline_metadata_landmarks.binarypb")
-    mesh = dict(_protobuf_fields(metadata))[1]
-    buffer = np.array([value for number, value in _protobuf_fields(mesh) if number == 3])
-    points = buffer.reshape(-1, 5)[:, :3]  # position and texture coordinates, interleaved
+    points = _canonical_mesh()[0]
     right, left = points[list(CANTHI_RIGHT)].mean(axis=0), points[list(CANTHI_LEFT)].mean(axis=0)
-    points = (points - (right + left) / 2) * (63.0 / np.linalg.norm(left - right))
+    points = (points - (right + left) / 2) * (INTERPUPILLARY_MM / np.linalg.norm(left - right))
     points[:, 2] += CANTHI_TO_EYE_CENTRE_MM
     points.flags.writeable = False
     return points
+
+
+@functools.lru_cache(maxsize=1)
+def canonical_normals():
+    """(478, 3) unit normals of the canonical face; the irises look straight ahead."""
+    normals = np.tile([0.0, 0.0, 1.0], (N_LANDMARKS, 1))
+    normals[:468] = vertex_normals(*_canonical_mesh())
+    normals.flags.writeable = False
+    return normals

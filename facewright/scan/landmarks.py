@@ -16,7 +16,13 @@ from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_normals, vertex_normals
 from facewright.mesh.raster import Camera, RayScene
 from facewright.mesh.render import render_with_hits
-from facewright.scan.detector import LANDMARK_NAMES, N_LANDMARKS, canonical_landmarks, detect_landmarks
+from facewright.scan.detector import (
+    LANDMARK_NAMES,
+    N_LANDMARKS,
+    canonical_landmarks,
+    canonical_normals,
+    detect_landmarks,
+)
 
 # (yaw, pitch) of the cameras in degrees: dense about the front, where the network is best; mirror-symmetric.
 VIEWS = tuple((float(yaw), float(pitch)) for pitch in (-15, 0, 15) for yaw in (-40, -20, 0, 20, 40))
@@ -33,11 +39,12 @@ EYE_LEFT = (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387
 NOSE = (1, 2, 4, 5, 6, 19, 94, 168, 195, 197, 48, 64, 98, 278, 294, 327)
 STABLE = LIPS_OUTER + LIPS_INNER + EYE_RIGHT + EYE_LEFT + NOSE
 
-# iBUG-68 p1..p68 in MediaPipe's numbering, the person's right first; the jaw line is only roughly the same line.
-IBUG68 = (127, 234, 93, 132, 172, 136, 150, 176, 152, 400, 379, 365, 397, 361, 323, 454, 356)
-IBUG68 = (*IBUG68, 70, 63, 105, 66, 107, 336, 296, 334, 293, 300, 168, 197, 5, 4, 98, 97, 2, 326, 327)
+# iBUG-68 p1..p68 in MediaPipe's numbering, the person's right first. Outline and brows are the same lines with other
+# points on them.
+IBUG68 = (127, 93, 132, 58, 136, 150, 149, 148, 152, 377, 378, 379, 365, 288, 361, 323, 356)
+IBUG68 = (*IBUG68, 70, 63, 105, 66, 107, 336, 296, 334, 293, 300, 8, 6, 195, 4, 98, 97, 2, 326, 327)
 IBUG68 = (*IBUG68, 33, 160, 158, 133, 153, 144, 362, 385, 387, 263, 373, 380)
-IBUG68 = (*IBUG68, 61, 39, 37, 0, 267, 269, 291, 405, 314, 17, 84, 181, 78, 82, 13, 312, 308, 317, 14, 87)
+IBUG68 = (*IBUG68, 61, 40, 37, 0, 267, 270, 291, 321, 314, 17, 84, 91, 78, 82, 13, 312, 308, 317, 14, 87)
 
 
 @functools.lru_cache(maxsize=1)
@@ -69,8 +76,10 @@ CLAY_LOOKS = Looks()
 class Sightings:
     """What the views saw. v views that found a face, k = 478 landmarks.
 
-    points  (v, k, 3) on the surface; facing (v, k): cosine between the surface's normal and the view, 0 where the
-            landmark's ray met nothing
+    points  (v, k, 3) on the surface
+    facing  (v, k) how squarely the view looks at the landmark, 0..1: the cosine between the view and the surface's
+            normal (0 where the ray met nothing) times the one with the canonical face's. Without the latter a
+            landmark of the far cheek, seen through the nose, would count as a good look at the nose
     seen    sorted indices of the faces that any camera saw
     missed  how many views found no face
     """
@@ -102,7 +111,7 @@ def cast_pixels(scene, camera, pixels):
 def sight_landmarks(vertices, faces, wardrobe, cameras, *, unlit=False):
     """Sightings of a mesh by cameras, one list entry for each Looks of the wardrobe.
 
-    vertices (n, 3) about mm and about the origin, faces (m, 3)
+    vertices (n, 3) in our frame or near it, about mm; faces (m, 3)
     unlit    show textures and colours as they are; clay is always lit
     """
     scene = RayScene(vertices, faces)
@@ -122,7 +131,8 @@ def sight_landmarks(vertices, faces, wardrobe, cameras, *, unlit=False):
             hit = lifted.face >= 0
             points[number].append(interpolate(vertices, faces, lifted.face, lifted.barycentric))
             # Of either sign: a surface may be wound inward, and a ray's first hit is visible all the same.
-            facing[number].append(np.where(hit, np.abs(of_faces[lifted.face] @ camera.R[2]), 0.0))
+            cosine = np.where(hit, np.abs(of_faces[lifted.face] @ camera.R[2]), 0.0)
+            facing[number].append(cosine * np.clip(canonical_normals() @ camera.R[2], 0.0, 1.0))
             seen[lifted.face[hit]] = True
     seen = np.flatnonzero(seen)
     shapes = [(len(views), N_LANDMARKS) for views in points]
@@ -152,7 +162,7 @@ def fuse_sightings(vertices, faces, sightings, *, outlier_mm=3.0):
     The weighted geometric median tells which sightings agree (within outlier_mm or twice the median distance); their
     mean is carried to the nearest surface that was seen from outside.
 
-    returns Landmarks "mp0".."mp477"; weight: the share of views that agree, less for a wide spread; 0: not usable
+    returns Landmarks "mp0".."mp477"; weight: the share of looks that agree, less for a wide spread; 0: not usable
     """
     if not len(sightings.points):
         zeros = np.zeros(N_LANDMARKS)
@@ -160,7 +170,7 @@ def fuse_sightings(vertices, faces, sightings, *, outlier_mm=3.0):
         return Landmarks(LANDMARK_NAMES, zeros.astype(np.int64), corner, zeros)
     points = sightings.points
     # A grazing hit moves far for a pixel's error.
-    weights = np.clip(sightings.facing - 0.2, 0.0, None)
+    weights = np.clip(sightings.facing - 0.05, 0.0, None)
     median = geometric_median(points, weights)
     distance = np.linalg.norm(points - median, axis=2)
     typical = np.nanmedian(np.where(weights > 0, distance, np.nan), axis=0, keepdims=True) if weights.any() else 0.0
@@ -170,7 +180,7 @@ def fuse_sightings(vertices, faces, sightings, *, outlier_mm=3.0):
     spread = np.sqrt(_weighted_mean((points - mean) ** 2, agreed).sum(axis=1))
     surface = Surface(vertices, faces[sightings.seen])
     nearest = surface.closest(mean)
-    share = inlier.mean(axis=0)
+    share = agreed.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-12)
     confidence = np.where(share > 0, share * np.exp(-((spread / 6.0) ** 2) - (nearest.distance / 6.0) ** 2), 0.0)
     return Landmarks(LANDMARK_NAMES, sightings.seen[nearest.faces], nearest.barycentric, confidence)
 

@@ -14,10 +14,12 @@ from facewright.data import Landmarks, Scan
 from facewright.errors import InputError
 from facewright.mesh.render import srgb_to_linear
 from facewright.scan.clean import far_components, keep_faces, turn_faces
-from facewright.scan.detector import CANTHI_LEFT, CANTHI_RIGHT, LANDMARK_NAMES
+from facewright.scan.detector import LANDMARK_NAMES
 from facewright.scan.landmark_files import landmark_index, place_landmarks
 from facewright.scan.landmarks import (
     CLAY_LOOKS,
+    EYE_LEFT,
+    EYE_RIGHT,
     STABLE,
     VIEWS,
     Looks,
@@ -233,9 +235,13 @@ def _look_again(scan, T, wardrobe, views):
 
 
 def _pupil_distance(scan, landmarks):
-    """Distance between the middles of the two eyes (of their canthi), in the scan's present unit."""
+    """Distance between the middles of the two eyes, in the scan's present unit.
+
+    The middle of an eye is that of the 16 points about it: of heads turned at random it differs by 0.05 % from run to
+    run, the middle of the canthi by 0.3 %, the iris by 0.4 % (worse where the eyes are closed).
+    """
     points = landmarks.positions(scan.vertices, scan.faces)
-    return float(np.linalg.norm(points[list(CANTHI_LEFT)].mean(axis=0) - points[list(CANTHI_RIGHT)].mean(axis=0)))
+    return float(np.linalg.norm(points[list(EYE_LEFT)].mean(axis=0) - points[list(EYE_RIGHT)].mean(axis=0)))
 
 
 def choose_unit(ipd, format_mm=None, given_mm=None):
