@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from facewright.mesh.normals import face_areas, face_normals, normalized
+from facewright.solve.procrustes import best_rotation
 from facewright.solve.quadratic import Factorization
 
 _THINNEST = 1e-3  # of the sum of squared edges: a thinner triangle's area counts as this (equilateral: 0.144)
@@ -35,24 +36,13 @@ class Links:
 
     pairs   (l, 2) vertex indices
     weights (l,) like a cotangent: 1 pulls as much as an edge of an equilateral mesh
+    by_gap  motion between the two counts in lengths of their gap (what closes it on the source closes it on the
+            target); else in sizes of the heads
     """
 
     pairs: np.ndarray
     weights: np.ndarray
-
-
-def best_rotation(source, target, weights=None):
-    """(3, 3) proper rotation R that takes centred source (n, 3) to centred target (n, 3) best: target ~ R source.
-
-    weights (n,) or None; Kabsch 1976.
-    """
-    weights = np.ones(len(source)) if weights is None else np.asarray(weights, float)
-    weights = weights / weights.sum()
-    a = source - weights @ source
-    b = target - weights @ target
-    U, _, Vt = np.linalg.svd((b * weights[:, None]).T @ a)
-    flip = np.sign(np.linalg.det(U @ Vt))
-    return (U * [1.0, 1.0, flip]) @ Vt
+    by_gap: bool = True
 
 
 def _target_edges_in_source_frames(source, target, faces):
@@ -121,10 +111,11 @@ class DeformationTransfer:
 
     source, target (n, 3) mm, faces (m, 3); fixed (n,) bool: never moves (at least one vertex)
     links   tuple of Links; nearest_links are added for components without a fixed vertex
+    rotation (3, 3) that turns the source onto the target; default: the best one for what moves
     cost    one sparse Cholesky factorisation; see bench/transfer.py
     """
 
-    def __init__(self, source, target, faces, *, fixed, links=()):
+    def __init__(self, source, target, faces, *, fixed, links=(), rotation=None):
         source, target = np.asarray(source, float), np.asarray(target, float)
         faces, fixed = np.asarray(faces), np.asarray(fixed, bool)
         _check(source, target, faces, fixed)
@@ -132,7 +123,9 @@ class DeformationTransfer:
         areas = face_areas(target, faces)
         moving_faces = ~fixed[faces].all(axis=1)
         weights = np.bincount(faces.ravel(), weights=np.repeat(areas * moving_faces, 3), minlength=n)
-        self.rotation = best_rotation(source, target, weights if weights.any() else None)
+        if rotation is None:
+            rotation = best_rotation(source, target, weights if weights.any() else None)
+        self.rotation = rotation
         self.source = source @ self.rotation.T
         self.faces = faces[moving_faces]
         self.fixed = fixed
@@ -140,48 +133,51 @@ class DeformationTransfer:
         links = (*links, nearest_links(self.source, faces, fixed))
         self._pairs = np.concatenate([link.pairs for link in links])
         self._pair_weights = np.concatenate([link.weights for link in links])
+        self._pair_by_gap = np.concatenate([np.full(len(link.pairs), link.by_gap) for link in links])
         self._set_up(target, ~fixed)
 
     def _set_up(self, target, free):
         """Factor the Poisson matrix and make the operators that turn source motion into right-hand sides."""
-        n, faces = len(target), self.faces
+        n, faces, pairs = len(target), self.faces, self._pairs
         half_cot = _cotangents(target, faces)
         w_bc, w_ac, w_ab = half_cot[:, 0], half_cot[:, 1], half_cot[:, 2]
         # Rows a, b, c of a face; columns: the wanted displacement differences along ab and ac.
         divergence = np.stack([-w_ab, -w_ac, w_ab + w_bc, -w_bc, -w_bc, w_ac + w_bc], axis=1).reshape(-1, 3, 2)
         P = divergence @ _target_edges_in_source_frames(self.source, target, faces)  # (m, 3, 3): ab, ac, normal
-        on_vertices = np.stack([-P[:, :, 0] - P[:, :, 1], P[:, :, 0], P[:, :, 1]], axis=2)
         rows, columns = np.repeat(faces, 3, axis=1), np.tile(faces, (1, 3))
-        from_vertices = _sparse(rows, columns, on_vertices, (n, n))
+        on_corners = np.stack([-P[:, :, 0] - P[:, :, 1], P[:, :, 0], P[:, :, 1]], axis=2)
+        self._from_vertices = _sparse(rows, columns, on_corners, (n, n))[free]
         face_index = np.repeat(np.arange(len(faces)), 3)
-        from_normals = _sparse(faces, face_index, P[:, :, 2], (n, len(faces)))
-        row, column = np.repeat(faces, 3, axis=1), np.tile(faces, (1, 3))
-        corner = np.concatenate([-(divergence.sum(axis=2, keepdims=True)), divergence], axis=2)
-        matrix = _sparse(row, column, corner, (n, n)) + _pair_laplacian(self._pairs, self._pair_weights, n)
-        self._from_vertices, self._from_normals = from_vertices[free], from_normals[free]
-        self._gap_maps = _gap_maps(self.source, target, self._pairs)
-        ones = self._pair_weights
-        index = np.arange(len(ones))
-        incidence = _sparse(self._pairs.T, np.stack([index, index]), np.stack([ones, -ones]), (n, len(ones)))
-        self._from_gaps = incidence[free]
+        self._from_normals = _sparse(faces, face_index, P[:, :, 2], (n, len(faces)))[free]
+        signs = np.tile(self._pair_weights, 2) * np.repeat([1.0, -1.0], len(pairs))
+        self._from_gaps = _sparse(pairs.T, np.tile(np.arange(len(pairs)), 2), signs, (n, len(pairs)))[free]
+        self._gap_maps = _gap_maps(self.source, target, pairs, self._pair_by_gap)
+        laplacian = np.concatenate([-divergence.sum(axis=2, keepdims=True), divergence], axis=2)
+        matrix = _sparse(rows, columns, laplacian, (n, n)) + _pair_laplacian(pairs, self._pair_weights, n)
+        self._from_held = matrix[free][:, ~free]
         self._factor = Factorization(matrix[free][:, free]) if free.any() else None
 
-    def transfer(self, deltas, base=None):
-        """Carry deltas (k, n, 3) mm of the source to the target: (k, n, 3) mm, zero where fixed.
+    def transfer(self, deltas, base=None, held=None):
+        """Carry deltas (k, n, 3) mm of the source to the target: (k, n, 3) mm.
 
         base (k, n, 3) or (n, 3): the deltas start from source + base instead of the source (a corrective such as
-        mouthClose, which is made on top of jawOpen); the result then starts from the target moved by base likewise.
+             mouthClose, which is made on top of jawOpen); the result then starts from the target moved by base likewise
+        held (k, n, 3): how the fixed vertices of the target move, known from elsewhere; default: not at all
         """
         deltas = np.asarray(deltas, float)
         if deltas.ndim != 3 or deltas.shape[1:] != self.source.shape:
             raise ValueError(f"deltas: expected (k, {len(self.source)}, 3), got {deltas.shape}")
-        moved = deltas if base is None else deltas + base
         result = np.zeros(deltas.shape)
+        if held is not None:
+            result[:, self.fixed] = held[:, self.fixed]
         if self._factor is None or not len(deltas):
             return result
-        rhs = self._right_hand_sides(moved)
+        rhs = self._right_hand_sides(deltas if base is None else deltas + base)
         if base is not None:
             rhs -= self._right_hand_sides(np.broadcast_to(base, deltas.shape))
+        if held is not None:
+            known = result[:, self.fixed].transpose(1, 0, 2)
+            rhs -= self._from_held @ known.reshape(len(known), -1)
         solution = self._factor.solve(rhs)
         result[:, ~self.fixed] = solution.reshape(len(solution), -1, 3).transpose(1, 0, 2)
         return result
@@ -215,17 +211,17 @@ class DeformationTransfer:
         return at, change
 
 
-def _gap_maps(source, target, pairs):
+def _gap_maps(source, target, pairs, by_gap):
     """(l, 3, 3) rotation times scale that takes source[i] - source[j] to target[i] - target[j].
 
-    Where the source's gap is next to nothing there is no direction: one scale, of the two heads' sizes, serves.
+    Where not by_gap (l,), or where a gap is next to nothing and has no direction, the scale of the heads' sizes.
     """
     a = source[pairs[:, 0]] - source[pairs[:, 1]]
     b = target[pairs[:, 0]] - target[pairs[:, 1]]
     length_a, length_b = np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)
     overall = np.linalg.norm(target - target.mean(axis=0)) / np.linalg.norm(source - source.mean(axis=0))
     maps = np.tile(overall * np.eye(3), (len(pairs), 1, 1))
-    clear = np.minimum(length_a, length_b) > _SMALL_GAP_MM
+    clear = by_gap & (np.minimum(length_a, length_b) > _SMALL_GAP_MM)
     u, v = a[clear] / length_a[clear, None], b[clear] / length_b[clear, None]
     axis, cosine = np.cross(u, v), (u * v).sum(axis=1)
     turn = np.zeros((len(u), 3, 3))

@@ -6,7 +6,6 @@ import pytest
 from facewright.transfer.deformation import (
     DeformationTransfer,
     Links,
-    best_rotation,
     deformation_transfer,
     nearest_links,
 )
@@ -205,13 +204,6 @@ def test_a_source_triangle_without_area_does_no_harm():
     result = deformation_transfer(source, target, faces, deltas, fixed=fixed)
     assert np.isfinite(result).all() and np.abs(result).max() < 3 * np.abs(deltas).max()
     assert np.abs(deformation_transfer(source, source, faces, deltas, fixed=fixed) - deltas).max() < 1e-8
-
-
-def test_best_rotation_recovers_a_rotation_and_never_reflects():
-    points = np.random.default_rng(0).normal(size=(20, 3))
-    R = rotation([3, -1, 2], 160)
-    assert np.allclose(best_rotation(points, points @ R.T + 5), R, atol=1e-12)
-    assert np.linalg.det(best_rotation(points, points * MIRROR)) > 0
 
 
 def test_misuse_is_refused():

@@ -1,0 +1,48 @@
+"""A few prescribed displacements spread smoothly over the mesh around them."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass
+from facewright.solve.quadratic import Factorization
+
+_LEAST_COTANGENT = 0.05  # obtuse corners have negative weights, which would let a field overshoot
+
+
+def spread_smoothly(V, F, handles, values, free, reach_mm=np.inf):
+    """The displacement field with the least bending that takes given values at handles and is 0 outside free.
+
+    Minimises  u^T L M^-1 L u + u^T M u / reach^4  with cotangents floored at 0.05.
+    V (n, 3), F (m, 3), handles (h,) vertex indices, values (h, d), free (n,) bool where the field may be other than 0
+    reach_mm  the field fades over about this distance; without it a tilt at the handles grows with distance
+    returns   (n, d); at the border of free the field and its slope vanish
+    """
+    n = len(V)
+    field = np.zeros((n, values.shape[1]))
+    field[handles] = values
+    unknown = free.copy()
+    unknown[handles] = False
+    if not unknown.any():
+        return field
+    near = unknown.copy()
+    near[F[unknown[F].any(axis=1)].ravel()] = True
+    faces = F[near[F].any(axis=1)]  # two rings: enough for L M^-1 L at the unknowns
+    used, local = np.unique(faces, return_inverse=True)
+    energy = _bending(V[used], local.reshape(-1, 3), reach_mm)
+    at = unknown[used]
+    rows = energy[at]
+    field[used[at]] = Factorization(rows[:, at]).solve(-(rows[:, ~at] @ field[used[~at]]))
+    return field
+
+
+def _bending(V, F, reach_mm):
+    """(n, n) csr L M^-1 L + M / reach^4."""
+    C = cotangent_laplacian(V, F).tocoo()
+    off = C.row != C.col
+    weights = np.maximum(-C.data[off], _LEAST_COTANGENT)
+    W = sp.coo_matrix((weights, (C.row[off], C.col[off])), shape=C.shape).tocsr()
+    L = sp.diags(np.asarray(W.sum(axis=1)).ravel()) - W
+    mass = np.maximum(lumped_mass(V, F), 1e-3)
+    return (L @ sp.diags(1.0 / mass) @ L + sp.diags(mass / reach_mm**4)).tocsr()

@@ -1,0 +1,208 @@
+"""Eyeballs behind the lids, and lids onto the eyeballs.
+
+Eyeballs grow little between people: a 12 mm ball is placed by the lid margins, never stretched with the sockets (which
+made it poke through the lids). Then the margins, which no scanner sees well, are laid onto the ball.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facewright.mesh.spread import spread_smoothly
+
+EYE_RADIUS_MM = 12.0
+RADIUS_LIMITS_MM = (11.0, 13.0)
+_CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
+
+
+@dataclass(frozen=True)
+class LidOptions:
+    """gap_mm          distance of the lid margin from the ball at rest
+    skin_clear_mm   least distance of the outer lid skin from the ball, reached some way from the margin
+    most_mm         how far a margin may be moved to lie on the ball; what is farther is an odd scan, left as it is
+    reach_mm        how far a margin's move is felt
+    rounds          rounds of pushing out what still lies inside the ball
+    """
+
+    gap_mm: float = 0.15
+    skin_clear_mm: float = 0.8
+    most_mm: float = 1.6
+    reach_mm: float = 6.0
+    rounds: int = 4
+
+
+@dataclass(frozen=True)
+class Eyeball:
+    """A ball with a cornea. center (3,) mm, radius of the sclera, profile: its radius by the angle from the axis +Z.
+
+    angles (a,) radians from the axis, radii (a,) mm
+    """
+
+    center: np.ndarray
+    radius: float
+    angles: np.ndarray
+    radii: np.ndarray
+
+    def surface_radius(self, points):
+        """(k,) distance of the eye's surface from its centre in the direction of points (k, 3)."""
+        offset = points - self.center
+        angle = np.arctan2(np.hypot(offset[:, 0], offset[:, 1]), offset[:, 2])
+        return np.interp(angle, self.angles, self.radii)
+
+    def gap(self, points):
+        """(k,) mm from the surface to points, negative inside."""
+        return np.linalg.norm(points - self.center, axis=1) - self.surface_radius(points)
+
+    def pushed_to(self, points, gap):
+        """Points (k, 3) moved along the ray from the centre until they lie gap (k,) mm off the surface."""
+        offset = points - self.center
+        length = np.linalg.norm(offset, axis=1)
+        return self.center + offset * ((self.surface_radius(points) + gap) / length)[:, None]
+
+
+def measure_eyeball(vertices, center):
+    """The Eyeball of an eye part's vertices (k, 3) that turns about center (3,).
+
+    The radius is that of the back half, where no cornea is; the profile takes the outermost vertex of each 3 degrees.
+    """
+    offset = vertices - center
+    distance = np.linalg.norm(offset, axis=1)
+    angle = np.arctan2(np.hypot(offset[:, 0], offset[:, 1]), offset[:, 2])
+    back = offset[:, 2] < 0
+    radius = float(np.median(distance[back] if back.any() else distance))
+    edges = np.radians(np.arange(0, 181, 3))
+    bins = np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2)
+    outermost = np.zeros(len(edges) - 1)
+    np.maximum.at(outermost, bins, distance)
+    seen = outermost > 0
+    middles = 0.5 * (edges[:-1] + edges[1:])
+    return Eyeball(np.asarray(center, float), radius, middles[seen], np.maximum(outermost[seen], radius))
+
+
+def eye_radius(template, vertices, lines):
+    """Radius of the person's eyeballs: 12 mm by the distance between the eyes against the template's, 11 to 13."""
+    names = [[f"lid_upper_{side}", f"lid_lower_{side}"] for side in ("left", "right")]
+    distance = []
+    for V, chains in ((template.vertices, template.lines), (vertices, lines)):
+        left, right = (np.concatenate([V[chains[name]] for name in pair]).mean(axis=0) for pair in names)
+        distance.append(np.linalg.norm(left - right))
+    return float(np.clip(EYE_RADIUS_MM * distance[1] / distance[0], *RADIUS_LIMITS_MM))
+
+
+def place_eyeball(template, vertices, lines, side, radius, options=None):
+    """The Eyeball of one side behind a person's lids.
+
+    Sideways and up it stands to the middle of the margins as the template's does; its depth makes the median gap of
+    the margins, corners apart, options.gap_mm. vertices (n, 3) of the person, lines as in Face, radius mm
+    """
+    options = options or LidOptions()
+    own = measure_eyeball(template.vertices[template.part(f"eye_{side}").vertex_slice], _joint(template, side))
+    scale = radius / own.radius
+    there, _ = _margin(template.vertices, template.lines, side)
+    margin, inner = _margin(vertices, lines, side)
+    center = margin.mean(axis=0) + scale * (own.center - there.mean(axis=0))
+    ball = Eyeball(center, radius, own.angles, own.radii * scale)
+    depth = _depths(ball, margin[inner], options.gap_mm)
+    return Eyeball(center + [0.0, 0.0, np.median(depth)], radius, ball.angles, ball.radii)
+
+
+def _joint(template, side):
+    return template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
+
+
+def _margin(vertices, lines, side):
+    """(k, 3) points of both margins and (k,) bool: away from the corners."""
+    points, inner = [], []
+    for lid in ("upper", "lower"):
+        chain = vertices[lines[f"lid_{lid}_{side}"]]
+        points.append(chain)
+        inner.append(_along(chain))
+    share = np.concatenate(inner)
+    return np.concatenate(points), (share > _CORNER_SHARE) & (share < 1 - _CORNER_SHARE)
+
+
+def _along(chain):
+    """(k,) arc length from 0 to 1 along points (k, 3)."""
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    return steps / max(steps[-1], 1e-12)
+
+
+def _depths(ball, points, gap):
+    """(k,) shift along Z of the ball that brings each point to a gap: by bisection, as gaps grow when it recedes."""
+    near, far = np.full(len(points), 3 * ball.radius), np.full(len(points), -3 * ball.radius)
+    for _ in range(40):
+        middle = 0.5 * (near + far)
+        moved = points - np.stack([np.zeros_like(middle), np.zeros_like(middle), middle], axis=1)
+        too_close = ball.gap(moved) < gap
+        near, far = np.where(too_close, middle, near), np.where(too_close, far, middle)
+    return 0.5 * (near + far)
+
+
+def fit_lids(template, vertices, regions, lines, side, ball, options=None):
+    """Lids laid onto an eyeball: the margins at options.gap_mm, no skin inside the ball.
+
+    vertices (n, 3); only the skin in regions eyes and socket_<side> moves, smoothly less towards their border.
+    returns (n, 3) and dict(margin_moved_mm, deepest_mm): the largest move of a margin, what still lies inside
+    """
+    options = options or LidOptions()
+    part = template.skin
+    faces = template.faces[part.face_slice]
+    V = vertices[part.vertex_slice]
+    rest = template.vertices[part.vertex_slice]
+    free = _lid_region(V, regions, part, side, ball)
+    outer = (regions["eyes"][part.vertex_slice] & free) & ~regions[f"socket_{side}"][part.vertex_slice]
+    handles, targets, held = _margin_targets(V, lines, side, ball, options)
+    clearance = _clearance(V, V[handles], outer, options)
+    wanted = {int(i): t for i, t in zip(handles, targets)}
+    moved = V
+    for _ in range(options.rounds):
+        index = np.array(sorted(wanted))
+        values = np.array([wanted[i] for i in index]) - V[index]
+        moved = V + spread_smoothly(rest, faces, index, values, free, options.reach_mm)
+        inside = free & ~held & (ball.gap(moved) < 0.5 * clearance)
+        inside[index] = False
+        if not inside.any():
+            break
+        at = np.flatnonzero(inside)
+        wanted.update(zip(at.tolist(), ball.pushed_to(moved[at], clearance[at])))
+    result = vertices.copy()
+    result[part.vertex_slice] = moved
+    stats = {
+        "margin_moved_mm": float(np.linalg.norm(moved[handles] - V[handles], axis=1).max()),
+        "deepest_mm": float(max(0.0, -ball.gap(moved[free & ~held]).min())),
+    }
+    return result, stats
+
+
+def _lid_region(V, regions, part, side, ball):
+    """(n_skin,) bool: skin of this eye that may move."""
+    eyes = regions["eyes"][part.vertex_slice] | regions[f"socket_{side}"][part.vertex_slice]
+    return eyes & (np.linalg.norm(V - ball.center, axis=1) < 3.0 * ball.radius)
+
+
+def _margin_targets(V, lines, side, ball, options):
+    """Margin vertices, where they shall lie, and (n_skin,) bool of the corners, which are left to follow."""
+    chains = [lines[f"lid_{lid}_{side}"] for lid in ("upper", "lower")]
+    held = np.zeros(len(V), bool)
+    handles, targets = [], []
+    for chain in chains:
+        share = _along(V[chain])
+        corner = np.minimum(share, 1 - share) < 0.5 * _CORNER_SHARE
+        held[chain[corner]] = True
+        keep = chain[~corner]
+        goal = ball.pushed_to(V[keep], np.full(len(keep), options.gap_mm))
+        step = goal - V[keep]
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        handles.append(keep)
+        targets.append(V[keep] + step * np.minimum(1.0, options.most_mm / np.maximum(length, 1e-12)))
+    return np.concatenate(handles), np.concatenate(targets), held
+
+
+def _clearance(V, margin, outer, options):
+    """(n_skin,) least gap to the ball: the margin's own inside the socket, growing with lid thickness outside."""
+    distance = np.sqrt(((V[outer][:, None] - margin[None]) ** 2).sum(axis=2)).min(axis=1)
+    clearance = np.full(len(V), 0.5 * options.gap_mm)
+    clearance[outer] = np.minimum(options.gap_mm + 0.3 * distance, options.skin_clear_mm)
+    return clearance

@@ -1,0 +1,139 @@
+"""All parts of a head placed for a person, and the skeleton that carries them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import igl
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.data import Skeleton
+from facewright.mesh.closest import Surface
+from facewright.mesh.raster import RayScene
+from facewright.parts.eyes import LidOptions, eye_radius, fit_lids, measure_eyeball, place_eyeball
+from facewright.solve.procrustes import best_similarity
+
+_MOUTH_REACH_MM = 18.0  # skin this near to the teeth says where they belong
+_JOINT_REACH_MM = 35.0
+_NEIGHBOURS = 12
+
+
+@dataclass(frozen=True)
+class PartOptions:
+    """lids           how lids meet the eyeballs
+    mouth_scale    least and most that teeth and tongue are scaled: teeth vary less than faces
+    most_back_mm   how far teeth may be moved back when they would stand in the lips
+    poke_mm        how much deeper than in the template a tooth may stand in the flesh
+    show_share     how much more of the teeth than in the template may be seen from the front at rest
+    """
+
+    lids: LidOptions = field(default_factory=LidOptions)
+    mouth_scale: tuple[float, float] = (0.85, 1.2)
+    most_back_mm: float = 4.0
+    poke_mm: float = 0.3
+    show_share: float = 0.01
+
+
+def fit_parts(face, options=None):
+    """The Face with every part in its place: eyes and lids first, then teeth and tongue, then what hangs on the skin.
+
+    face    data.Face; its skin decides, whatever its other vertices say
+    returns data.Face with new vertices; stats gain "parts"
+    """
+    options = options or PartOptions()
+    template = face.template
+    V = np.array(face.vertices)
+    stats = {}
+    radius = eye_radius(template, V, face.lines)
+    for side in ("left", "right"):
+        ball = place_eyeball(template, V, face.lines, side, radius, options.lids)
+        V, lids = fit_lids(template, V, face.regions, face.lines, side, ball, options.lids)
+        V[template.part(f"eye_{side}").vertex_slice] = _eye_vertices(template, side, ball)
+        stats[f"eye_{side}"] = {"radius_mm": ball.radius, "center_mm": ball.center.tolist(), **lids}
+    mouth = [part for part in template.parts if part.attach in ("skull", "jaw")]
+    if mouth:
+        V, stats["mouth"] = _fit_mouth(template, V, mouth, options)
+    for part in template.parts[1:]:
+        if part.attach == "skin":
+            V[part.vertex_slice] = _carried(template, V, part)
+    return replace(face, vertices=V, stats=face.stats | {"parts": stats})
+
+
+def fit_skeleton(template, vertices):
+    """The template's Skeleton moved to a person's joints: eyes to their balls, the rest with the skin around.
+
+    vertices (n, 3) as fit_parts leaves them
+    """
+    skin = template.skin.vertex_slice
+    positions = []
+    for name, joint in zip(template.skeleton.names, template.skeleton.positions):
+        if name.startswith("eye_"):
+            part = template.part(name).vertex_slice
+            R, scale, t = best_similarity(template.vertices[part], vertices[part])
+        else:
+            distance = np.linalg.norm(template.vertices[skin] - joint, axis=1)
+            reach = max(_JOINT_REACH_MM, float(distance.min()))
+            weights = np.exp(-0.5 * (distance / reach) ** 2)
+            R, scale, t = best_similarity(template.vertices[skin], vertices[skin], weights)
+        positions.append(scale * R @ joint + t)
+    return Skeleton(template.skeleton.names, template.skeleton.parents, np.array(positions))
+
+
+def _eye_vertices(template, side, ball):
+    """The template's eye, brought to a ball without turning it."""
+    part = template.part(f"eye_{side}").vertex_slice
+    joint = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
+    own = measure_eyeball(template.vertices[part], joint)
+    return ball.center + (template.vertices[part] - own.center) * (ball.radius / own.radius)
+
+
+def _fit_mouth(template, vertices, parts, options):
+    """Teeth, gums and tongue by one similarity of the skin around them, so that the bite stays as it is.
+
+    Only the outer skin counts where there is any: nobody scans the inside of a closed mouth.
+    """
+    index = np.concatenate([np.arange(*part.vertices) for part in parts])
+    rest = template.vertices[index]
+    skin = template.regions["outer"] & template.regions["skin"]
+    distance = cKDTree(rest).query(template.vertices[skin])[0]
+    weights = np.exp(-0.5 * (distance / _MOUTH_REACH_MM) ** 2)
+    R, scale, t = best_similarity(template.vertices[skin], vertices[skin], weights, options.mouth_scale)
+    placed = scale * rest @ R.T + t
+    allowed = _misplaced(template.vertices, template, rest) + [options.poke_mm, options.show_share]
+    steps = np.arange(0.0, options.most_back_mm + 1e-9, 0.5)
+    tried = []
+    for back in steps:
+        tried.append(_misplaced(vertices, template, placed - [0.0, 0.0, back]))
+        if (tried[-1] <= allowed).all():
+            break
+    best = int(np.argmin([np.maximum(found - allowed, 0.0) @ [1.0, 20.0] for found in tried]))
+    result = vertices.copy()
+    result[index] = placed - [0.0, 0.0, steps[best]]
+    stats = {"scale": scale, "moved_back_mm": float(steps[best])}
+    return result, stats | {"deepest_in_skin_mm": float(tried[best][0]), "seen_from_front_share": float(tried[best][1])}
+
+
+def _misplaced(vertices, template, points):
+    """Depth in mm of the deepest of points (k, 3) inside the flesh, and the share of them that is seen from the front.
+
+    Flesh lies between the outer skin and the mouth bag, which are one surface, closed but for the neck.
+    """
+    part = template.skin
+    V, F = vertices[part.vertex_slice], template.faces[part.face_slice]
+    inside = igl.fast_winding_number(np.ascontiguousarray(V), np.ascontiguousarray(F), np.ascontiguousarray(points))
+    inside = np.asarray(inside).reshape(-1) > 0.5
+    depth = Surface(V, F).closest(points[inside]).distance.max() if inside.any() else 0.0
+    seen = ~RayScene(V, F).occluded(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
+    return np.array([depth, seen.mean()])
+
+
+def _carried(template, vertices, part):
+    """Vertices of a part that hangs on the skin (lashes, fluid): moved as the skin around them, the nearest most."""
+    skin = template.skin.vertex_slice
+    rest = template.vertices[part.vertex_slice]
+    distance, near = cKDTree(template.vertices[skin]).query(rest, k=_NEIGHBOURS)
+    weights = 1.0 / (distance + 0.05) ** 2
+    weights /= weights.sum(axis=1, keepdims=True)
+    shift = vertices[skin] - template.vertices[skin]
+    return rest + np.einsum("pk,pkd->pd", weights, shift[near])

@@ -1,0 +1,195 @@
+"""All shapes of a template carried to a person: skin by deformation transfer, bones and eyes rigidly, the rest along.
+
+Skin and mouth bag are one Poisson system with the skull held. Eyes turn about their own centres; lower teeth and tongue
+turn with the jaw about the person's hinge, which is read off the skin that moves with it; lashes, fluid and gums are
+a second, small system that hangs on the moved skin and bones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facewright.solve.procrustes import best_rotation, best_similarity
+from facewright.transfer.deformation import DeformationTransfer, Links
+
+CORRECTIVE_BASE = {"mouthClose": "jawOpen"}
+"""Shapes that are made on top of another one and mean nothing without it."""
+
+_HINGE_PULL = 0.02  # of the skin's weight: holds the hinge where the skin says little (along its axis)
+_RIGID_SKIN_MM = 2.0  # skin that strays by this from the jaw's rigid motion counts little for the hinge
+
+
+@dataclass(frozen=True)
+class TransferOptions:
+    """w_lids  how firmly the two lid margins keep their relation (closing stays closing); 0: not at all
+    w_lips  the same for the line where the lips meet
+    """
+
+    w_lids: float = 5.0
+    w_lips: float = 0.3
+
+
+def transfer_shapes(face, options=None):
+    """The shapes of face.template on a person: (s, n, 3) mm from face.vertices, in the template's order.
+
+    face  data.Face with its parts in place (parts.fit_parts)
+    """
+    options = options or TransferOptions()
+    template, V = face.template, face.vertices
+    stop = template.skin.vertices[1]
+    faces = template.faces[template.skin.face_slice]
+    fixed = face.regions["skull"][:stop]
+    if not fixed.any():
+        fixed = ~template.deltas[:, :stop].any(axis=(0, 2))
+    links = feature_links(face.lines, template.vertices, options)
+    skin = DeformationTransfer(template.vertices[:stop], V[:stop], faces, fixed=fixed, links=links)
+    result = np.zeros(template.deltas.shape)
+    result[:, :stop] = _with_bases(skin, template, stop)
+    _carry_bones(template, V, skin.rotation, result)
+    _carry_the_rest(template, V, skin.rotation, result)
+    return result
+
+
+def feature_links(lines, vertices, options=None):
+    """Links between the lid margins of each eye and between the lips, from feature lines (as in Face)."""
+    options = options or TransferOptions()
+    links = []
+    for side in ("left", "right"):
+        upper, lower = lines.get(f"lid_upper_{side}"), lines.get(f"lid_lower_{side}")
+        if upper is not None and lower is not None and options.w_lids > 0:
+            links.append(_pair_lines(upper, lower, vertices, options.w_lids, by_gap=True))
+    upper, lower = lines.get("lip_seam_upper"), lines.get("lip_seam_lower")
+    if upper is not None and lower is not None and options.w_lips > 0:
+        links.append(_pair_lines(upper, lower, vertices, options.w_lips, by_gap=False))
+    return tuple(links)
+
+
+def _pair_lines(one, other, vertices, weight, by_gap):
+    """Links from each inner vertex of one line to the vertex of the other at the same share of its length."""
+    shares = [_along(vertices[line]) for line in (one, other)]
+    partner = np.abs(shares[0][:, None] - shares[1][None]).argmin(axis=1)
+    pairs = np.stack([one, other[partner]], axis=1)[1:-1]
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    return Links(pairs, np.full(len(pairs), weight), by_gap)
+
+
+def _along(chain):
+    """(k,) arc length from 0 to 1 along points (k, 3)."""
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    return steps / max(steps[-1], 1e-12)
+
+
+def _with_bases(transfer, template, stop):
+    """(s, n_skin, 3): shapes from the neutral, correctives from the shape they are made on."""
+    deltas = template.deltas[:, :stop]
+    names = template.shape_names
+    plain = [i for i, name in enumerate(names) if CORRECTIVE_BASE.get(name) not in names]
+    result = np.zeros(deltas.shape)
+    result[plain] = transfer.transfer(deltas[plain])
+    for i in sorted(set(range(len(names))) - set(plain)):
+        result[i] = transfer.transfer(deltas[i : i + 1], base=deltas[names.index(CORRECTIVE_BASE[names[i]])])[0]
+    return result
+
+
+def _carry_bones(template, V, rotation, result):
+    """Fill in the parts that turn as a whole: eyes, and what is attached to skull or jaw."""
+    still = np.tile(np.eye(3), (len(template.shape_names), 1, 1))
+    jaw_turns, hinge = still, np.zeros((2, 3))
+    lead = _lead_of_jaw(template)
+    if lead is not None:
+        jaw_turns = _turns(*_aligned(template, lead, rotation))
+        hinge = _hinges(template, V, rotation, lead, jaw_turns, result)
+    for part in template.parts[1:]:
+        source, deltas = _aligned(template, part, rotation)
+        target = V[part.vertex_slice]
+        similarity = best_similarity(source, target)
+        if part.attach == "jaw":
+            turns, pivots = jaw_turns, hinge
+        elif part.attach.startswith("eye_"):
+            joint = rotation @ _joint(template, part.attach)
+            turns, pivots = _turns(source, deltas), (joint, _map(similarity, joint))
+        elif part.attach == "skull":
+            turns, pivots = still, hinge
+        else:
+            continue
+        result[:, part.vertex_slice] = _turned(source, target, deltas, turns, pivots, similarity[1])
+
+
+def _aligned(template, part, rotation):
+    """Vertices (p, 3) and deltas (s, p, 3) of a part, turned onto the person."""
+    return template.vertices[part.vertex_slice] @ rotation.T, template.deltas[:, part.vertex_slice] @ rotation.T
+
+
+def _lead_of_jaw(template):
+    """The part that shows how the jaw moves: the lower teeth, else whatever is attached to it, else None."""
+    parts = [part for part in template.parts if part.attach == "jaw"]
+    return next((part for part in parts if part.name == "teeth_lower"), parts[0] if parts else None)
+
+
+def _joint(template, name):
+    return template.skeleton.positions[template.skeleton.names.index(name)]
+
+
+def _map(similarity, point):
+    R, scale, t = similarity
+    return scale * R @ point + t
+
+
+def _turns(points, deltas):
+    """(s, 3, 3) the rotation of points (p, 3) under each of deltas (s, p, 3); exactly none where nothing moves."""
+    turns = np.tile(np.eye(3), (len(deltas), 1, 1))
+    for turn, delta in zip(turns, deltas):
+        if delta.any():
+            turn[:] = best_rotation(points, points + delta)
+    return turns
+
+
+def _turned(source, target, deltas, turns, pivots, scale):
+    """(s, p, 3): the target turns as the source about its own pivot; what is not a turn is scaled along.
+
+    source, target (p, 3), deltas (s, p, 3) of the source, turns (s, 3, 3), pivots: a point (3,) of each
+    """
+    by = turns - np.eye(3)
+    rest = deltas - (source - pivots[0]) @ by.transpose(0, 2, 1)
+    return (target - pivots[1]) @ by.transpose(0, 2, 1) + scale * rest
+
+
+def _hinges(template, V, rotation, lead, turns, result):
+    """The jaw's hinge on the template (turned onto the person) and on the person, each (3,).
+
+    The person's is where a turn as large as the template's explains the skin's motion under jawOpen best, strays of
+    the skin from the bone's motion scaled along; sideways, and where there is no such shape, it keeps to the teeth.
+    """
+    source, deltas = _aligned(template, lead, rotation)
+    similarity = best_similarity(source, V[lead.vertex_slice])
+    joint = rotation @ _joint(template, "jaw")
+    carried = _map(similarity, joint)
+    if "jawOpen" not in template.shape_names:
+        return joint, carried
+    k = template.shape_names.index("jawOpen")
+    by = turns[k] - np.eye(3)
+    skin, skin_deltas = _aligned(template, template.skin, rotation)
+    rest = skin_deltas[k] - (skin - joint) @ by.T
+    bone = (deltas[k] - (source - joint) @ by.T).mean(axis=0)
+    weights = np.exp(-((np.linalg.norm(rest - bone, axis=1) / _RIGID_SKIN_MM) ** 2))
+    weights *= np.linalg.norm(skin_deltas[k], axis=1) > 0.1 * np.abs(deltas[k]).max()
+    if weights.sum() < 10 or np.abs(by).max() < 0.05:
+        return joint, carried
+    at = template.skin.vertex_slice
+    offset = weights @ (result[k, at] - V[at] @ by.T - similarity[1] * rest) / weights.sum()
+    pull = _HINGE_PULL * np.trace(by.T @ by)
+    return joint, np.linalg.solve(by.T @ by + pull * np.eye(3), pull * carried - by.T @ offset)
+
+
+def _carry_the_rest(template, V, rotation, result):
+    """Fill in the parts that hang on the skin: a system of their own, with skin and bones as they move."""
+    hanging = [part for part in template.parts[1:] if part.attach == "skin"]
+    if not hanging or not any(template.deltas[:, part.vertex_slice].any() for part in hanging):
+        return
+    fixed = np.ones(len(V), bool)
+    for part in hanging:
+        fixed[part.vertex_slice] = False
+    hang = DeformationTransfer(template.vertices, V, template.faces, fixed=fixed, rotation=rotation)
+    result[:] = hang.transfer(template.deltas, held=result)
