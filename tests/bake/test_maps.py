@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facewright.bake.bake import FILLED, INSIDE, SEEN, BakeOptions, bake, describe_maps
+from facewright.bake.maps import FILLED, INSIDE, SEEN, BakeOptions, bake, describe_maps
 from facewright.bake.texels import at_corners, at_points, build_texels
 from facewright.data import Face, Scan
 from facewright.mesh.normals import normalized, vertex_normals
