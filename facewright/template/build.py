@@ -52,7 +52,8 @@ def build_template(source_folder, description_path):
 
     deltas = _shape_rules(description, shaped, vertices, names, deltas, head)
     identity = _even_eyes(shaped, vertices, identity, head)
-    regions = _whole_head(regions, len(vertices)) | {"skull": _skull(shaped, deltas, vertices)}
+    regions = _whole_head(regions, len(vertices))
+    regions["skull"] = regions["outer"] & still_region(deltas, 0.05)
     faces, _ = triangulated(shaped.polygons)
     uv_faces, _ = triangulated(shaped.uv_polygons)
     skeleton, skin_weights = head_skeleton(vertices, faces, shaped, deltas[names.index("jawOpen")], regions, head.eyes)
@@ -233,13 +234,6 @@ def _even_eyes(shaped, vertices, identity, head):
 def _whole_head(regions, n):
     """Masks of the skin as masks of all parts."""
     return {name: np.concatenate([mask, np.zeros(n - len(mask), bool)]) for name, mask in regions.items()}
-
-
-def _skull(shaped, deltas, vertices):
-    """(n,) bool: skin that no shape moves: the back of the head and the neck."""
-    skin = np.zeros(len(vertices), bool)
-    skin[shaped.parts[0].vertex_slice] = True
-    return skin & still_region(deltas, 0.05)
 
 
 def _landmarks(folder, description, shaped, faces, mirror):

@@ -14,7 +14,7 @@ from facewright.mesh.adjacency import border_loops
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.raster import RayScene
 from facewright.template.loops import paired, separating_loop, shortest_path, split_loop
-from facewright.template.regions import Loops, enclosed, eye_pouch, mouth_bag, seen_from_inside
+from facewright.template.regions import Loops, enclosed, eye_pouch, mouth_bag, polygons_within, seen_from_inside
 
 
 def find_loops(head, openness):
@@ -53,15 +53,13 @@ def _upper_first(head, first, second):
     return (first, second) if y[first].mean() > y[second].mean() else (second, first)
 
 
-def _all_corners(mask, polygons):
-    """(p,) bool: polygons all of whose corners are in a vertex mask."""
-    return (mask[polygons] | (polygons < 0)).all(axis=1)
-
-
 def _lid_loop(head):
     far = np.linalg.norm(head.vertices - head.eyes[0], axis=1) > 45 * head.scale
     return separating_loop(
-        head.vertices, head.polygons, _all_corners(eye_pouch(head), head.polygons), _all_corners(far, head.polygons)
+        head.vertices,
+        head.polygons,
+        polygons_within(eye_pouch(head), head.polygons),
+        polygons_within(far, head.polygons),
     )
 
 
@@ -75,8 +73,8 @@ def _mouth_loop(head):
     return separating_loop(
         head.vertices,
         head.polygons,
-        _all_corners(bag, head.polygons),
-        _all_corners(far, head.polygons),
+        polygons_within(bag, head.polygons),
+        polygons_within(far, head.polygons),
         edge_factor=lambda edges: 0.3 + gap[edges].mean(axis=1),
     )
 
@@ -99,13 +97,13 @@ def _nostril_loop(head, openness, lips):
     around = np.linalg.norm(v - tip - np.array([0, -5, -10]) * scale, axis=1) < 24 * scale
     dark = around & ~blocked & (openness < 0.2) & (v[:, 0] > 0)
     bright = (openness > 0.75) | ~around | (v[:, 0] < 0)
-    if not _all_corners(dark, head.polygons).any():
+    if not polygons_within(dark, head.polygons).any():
         raise StageError("template", "no_nostril", "no dark pit was found beneath the nose tip")
     return separating_loop(
         v,
         head.polygons,
-        _all_corners(dark, head.polygons),
-        _all_corners(bright & ~dark, head.polygons),
+        polygons_within(dark, head.polygons),
+        polygons_within(bright & ~dark, head.polygons),
         edge_factor=lambda edges: 0.15 + 3 * (2 * openness[edges].mean(axis=1) - 0.9) ** 2,
     )
 

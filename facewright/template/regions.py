@@ -15,13 +15,14 @@ from scipy.spatial import cKDTree
 
 from facewright.errors import StageError
 from facewright.mesh.adjacency import dilate
+from facewright.mesh.closest import Surface
 from facewright.mesh.laplacian import uniform_laplacian
 from facewright.mesh.normals import face_normals
 from facewright.mesh.openness import sphere_directions, vertex_openness
 from facewright.mesh.polygons import polygon_edges, triangulated
 from facewright.mesh.raster import RayScene
 from facewright.solve.quadratic import Factorization
-from facewright.template.loops import shortest_path
+from facewright.template.loops import separating_loop, shortest_path
 
 EYE_DISTANCE_MM = 63.0  # lengths below are for a head whose eyes are this far apart
 HAIRLINE = 0.62  # height of the hairline above the eyes, in distances from eyes to chin
@@ -194,36 +195,38 @@ def _lip_red(head, outer, loops, lines, lip):
 
 
 def _left_ear(head, outer):
-    """(n,) bool: what stands more than 3.5 mm out of a membrane spanned over the side of the head."""
+    """(n,) bool: what stands more than 2.5 mm out of a thin plate spanned over the side of the head."""
     v, scale = head.vertices, head.scale
-    eye, chin = head.eyes[0], head.mouth
-    band = outer & (v[:, 1] < eye[1] + 25 * scale) & (v[:, 1] > chin[1] - 25 * scale) & (v[:, 2] < eye[2] - 30 * scale)
+    band = outer & (v[:, 1] < head.eyes[0, 1] + 25 * scale) & (v[:, 1] > head.mouth[1] - 25 * scale)
+    band &= v[:, 2] < head.eyes[0, 2] - 30 * scale
     if not band.any():
         raise StageError("template", "no_ear", "no skin beside the head where ears are")
     tip = np.flatnonzero(band)[np.argmax(v[band, 0])]
     # The middle of the ear: what is nearly as far out as its outermost point.
-    flap = band & (v[:, 0] > v[tip, 0] - 14 * scale)
-    center = v[flap].mean(axis=0)
-    disc = outer & (np.linalg.norm(v - center, axis=1) < 55 * scale) & (v[:, 0] > 0)
-    base = _membrane(v, head.faces, disc)
-    standing = disc & (np.linalg.norm(v - base, axis=1) > 3.5 * scale) & (v[:, 0] > base[:, 0] - 2 * scale)
-    edges = polygon_edges(head.polygons)
-    edges = edges[standing[edges].all(axis=1)]
-    labels = connected_components(
-        sp.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(v),) * 2), directed=False
-    )[1]
-    ear = standing & (labels == labels[tip])
-    return outer & dilate(ear, head.faces)
+    center = v[band & (v[:, 0] > v[tip, 0] - 14 * scale)].mean(axis=0)
+    disc = outer & (np.linalg.norm(v - center, axis=1) < 46 * scale) & (v[:, 0] > 0)
+    plate = Surface(_thin_plate(v, head.faces, disc), head.faces[disc[head.faces].any(axis=1)])
+    standing = disc.copy()
+    standing[disc] = plate.closest(v[disc]).distance > 2.5 * scale
+    standing = enclosed(head.polygons, len(v), np.flatnonzero(~standing), np.arange(len(v)) == tip)
+    inside = polygons_within(standing, head.polygons)
+    outside = polygons_within(np.linalg.norm(v - center, axis=1) > 46 * scale, head.polygons)
+    root = separating_loop(v, head.polygons, inside, outside)
+    return outer & (enclosed(head.polygons, len(v), root, standing) | np.isin(np.arange(len(v)), root))
 
 
-def _membrane(vertices, faces, inside):
-    """vertices with those inside replaced by the uniform membrane over their border."""
+def polygons_within(mask, polygons):
+    """(p,) bool: polygons all of whose corners are in a vertex mask."""
+    return (mask[polygons] | (polygons < 0)).all(axis=1)
+
+
+def _thin_plate(vertices, faces, inside):
+    """vertices with those inside replaced by a plate that continues the surface around them smoothly."""
     L = uniform_laplacian(faces, len(vertices)).tocsr()
-    index = np.flatnonzero(inside)
-    rest = np.flatnonzero(~inside)
-    rhs = -(L[index][:, rest] @ vertices[rest])
+    B = (L @ L).tocsr()
+    index, rest = np.flatnonzero(inside), np.flatnonzero(~inside)
     filled = vertices.copy()
-    filled[index] = Factorization(L[index][:, index]).solve(rhs)
+    filled[index] = Factorization(B[index][:, index]).solve(-(B[index][:, rest] @ vertices[rest]))
     return filled
 
 
@@ -249,9 +252,9 @@ def chin_points(head, lines):
     """(menton (3,), fold (3,)): the lowest point of the chin, and the fold where chin and neck meet."""
     seam = lines["lip_seam_lower"]
     profile = head.vertices[midline_profile(head, seam[len(seam) // 2])]
-    profile = profile[profile[:, 1] > head.mouth[1] - 110 * head.scale]
-    # Leaning forward and down: the chin is furthest along that way, the fold furthest the other way behind it.
-    chin = int(np.argmax(profile @ np.array([0.0, -0.8, 0.6])))
+    profile = profile[profile[:, 1] > head.mouth[1] - 95 * head.scale]
+    # The chin is furthest forward and somewhat down; the fold lies deepest behind the chord from there to the neck.
+    chin = int(np.argmax(profile @ np.array([0.0, -0.4, 0.92])))
     behind = profile[chin:]
     chord = behind[-1] - behind[0]
     off = behind - behind[0] - np.outer((behind - behind[0]) @ chord / (chord @ chord), chord)
@@ -259,12 +262,12 @@ def chin_points(head, lines):
 
 
 def _below_jaw(head, lines, ear_left):
-    """(n,) bool: below the plane through the fold under the chin and the lowest points of the ears."""
+    """(n,) bool: below the plane through the fold under the chin and the lobes; behind them, below the lobes."""
     _, fold = chin_points(head, lines)
     v = head.vertices
     lobe = v[ear_left][np.argmin(v[ear_left, 1])]
     slope = (fold[1] - lobe[1]) / (fold[2] - lobe[2])
-    return v[:, 1] < lobe[1] + slope * (v[:, 2] - lobe[2])
+    return v[:, 1] < lobe[1] + slope * np.maximum(v[:, 2] - lobe[2], 0.0)
 
 
 def _hairline(head, lines):
