@@ -125,14 +125,14 @@ def make_head(template, vertices, rng, seed, options):
         seen = points + height[:, None] * normals
         kind = np.where((kind == SKIN) & (height[faces].mean(axis=1) > 0.6), HAIR, kind)
     seen = seen + rng.normal(0.0, options.noise_mm, len(seen))[:, None] * normals
-    chin = vertices[template.regions["face"] & (np.abs(vertices[:, 0]) < 15.0), 1].min()
+    chin = chin_height(template, vertices)
     kept = _kept(points[faces].mean(axis=1), template, vertices, chin, rng, seed, options)
     head = [(seen, faces[kept], points, kind[kept])]
     if options.strands and options.hair_mm > 0:
         ribbons, ribbon_faces = strands(Surface(seen, faces), *_strand_starts(points, depth, options.strands, rng), rng)
         head.append((ribbons, ribbon_faces, ribbons, np.full(len(ribbon_faces), HAIR)))
     if options.collar:
-        cloth, cloth_faces = collar(V, F, chin - 52.0, rng)
+        cloth, cloth_faces = collar(V, F, max(chin - 48.0, V[:, 1].min() + 5.0), rng)
         head.append((cloth, cloth_faces, cloth, np.full(len(cloth_faces), CLOTH)))
     return _joined(head, (V, F))
 
@@ -149,20 +149,29 @@ def _joined(pieces, surface):
 
 def scalp_depth(template, vertices, points):
     """(k,) how far inside the hairline points (k, 3) are, mm; negative outside."""
-    outer = template.regions["outer"]
-    scalp = template.regions["scalp"] & outer
+    regions, (_, y, z) = template.regions, vertices.T
+    outer, ears = regions["outer"], regions["ear_left"] | regions["ear_right"]
+    hairline = -25.0 - 0.6 * np.clip(z[ears].mean() - z, 0.0, 90.0)
+    scalp = outer & ~regions["face"] & ~ears & (y > hairline)
     to_scalp = cKDTree(vertices[scalp]).query(points)[0]
     to_skin = cKDTree(vertices[outer & ~scalp]).query(points)[0]
     return to_skin - to_scalp
 
 
+def chin_height(template, vertices):
+    """Height of the chin, mm: the lowest point of the face that is not behind the mouth's corners."""
+    corner = vertices[template.lines["lip_seam_upper"][0]]
+    front = template.regions["face"] & (vertices[:, 2] > corner[2] - 5.0) & (np.abs(vertices[:, 0]) < 15.0)
+    return float(vertices[front, 1].min())
+
+
 def _kept(centers, template, vertices, chin, rng, seed, options):
     """(m,) bool: faces that the scanner saw; centers (m, 3)."""
     wave = 4.0 * fractal_noise(centers, 25.0, seed + 11)
-    kept = centers[:, 1] + 0.25 * centers[:, 2] > chin - 60.0 + wave
+    kept = centers[:, 1] + 0.25 * centers[:, 2] > chin - 55.0 + wave
     if options.open_back:
-        behind = vertices[template.regions["outer"], 2]
-        kept &= centers[:, 2] > np.quantile(behind, 0.35) + wave
+        ears = template.regions["ear_left"] | template.regions["ear_right"]
+        kept &= centers[:, 2] > vertices[ears, 2].mean() - 12.0 + wave
     side = rng.choice([-1.0, 1.0])
     places = [(side * 52.0, chin + 38.0, 6.0), (side * -12.0, chin - 30.0, 10.0), (side * 40.0, chin - 25.0, 8.0)]
     for x, y, radius in places[: options.holes]:
