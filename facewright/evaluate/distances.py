@@ -16,7 +16,9 @@ from facewright.conventions import INTERPUPILLARY_MM
 from facewright.mesh.adjacency import border_edges
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_areas, vertex_normals
+from facewright.mesh.openness import vertex_openness
 
+HIDDEN = 0.03  # openness under which a scan's face lies in a pocket of its own
 PLASTIC = 0.7548776662466927  # with its square the least regular pair of steps on the unit square
 
 
@@ -166,7 +168,7 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
         "lips": regions["lips"],
         "nostrils": regions["nostrils"],
     }
-    near = _faces_near(scan, fit[asked["face"]]) if subset is None else subset
+    near = _visible_faces_near(scan, fit[asked["face"]]) if subset is None else subset
     surface = (scan.vertices * scale, scan.faces)
     to_face = scan_to_face(surface, fit * scale, faces, asked, subset=near, count=count)
     to_scan = face_to_scan(surface, fit * scale, faces, asked, count=count // 2)
@@ -182,6 +184,12 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
         "nostrils": {"scan_to_face": to_face["nostrils"], "face_to_scan": to_scan["nostrils"]},
         "normal_deg_mean": normal_deg,
     }
+
+
+def _visible_faces_near(scan, points):
+    """As _faces_near, without the scan's own mouth bag and pouches: what no camera sees is no skin to compare with."""
+    openness = vertex_openness(scan.vertices, scan.faces, n_directions=64)[scan.faces].mean(axis=1)
+    return _faces_near(scan, points) & (openness > HIDDEN)
 
 
 def _faces_near(scan, points, margin_mm=40.0):

@@ -11,7 +11,6 @@ import numpy as np
 from facewright.mesh.adjacency import border_loops
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import face_areas, face_normals, vertex_normals
-from facewright.mesh.raster import RayScene
 
 EYE_RINGS = 7
 NOSTRIL_RINGS = 3
@@ -35,7 +34,7 @@ def scanner_surface(template, vertices):
         if kind is None:
             continue
         if kind.startswith("eye"):
-            added, patch = _eye_patch(loop, vertices, template.part(kind), template.faces, start)
+            added, patch = _eye_patch(loop, vertices, template.part(kind), start)
             eye_faces += len(patch)
             faces.insert(1, patch)
         elif kind == "mouth":
@@ -91,27 +90,32 @@ def _ring_faces(loop, count, start):
     return faces[:, ::-1]  # a border loop runs against its patch
 
 
-def _eye_patch(loop, vertices, part, faces, start):
+def eyeball(points):
+    """centre (3,) and radius of an eyeball that looks along +Z, from vertices (k, 3) of it; a cap may be missing."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    radius = float((high - low)[:2].mean() / 2)
+    return np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] + radius]), radius
+
+
+def _eye_patch(loop, vertices, part, start):
     """Points and faces of the bump that the eyeball shows between the lids, met smoothly by the lid margin."""
-    ball_faces = faces[part.face_slice]
-    ball = vertices[part.vertex_slice]
-    center = (ball.max(axis=0) + ball.min(axis=0)) / 2
+    center, radius = eyeball(vertices[part.vertex_slice])
     rim = vertices[loop]
-    forward = rim.mean(axis=0) - center
-    forward = forward / np.linalg.norm(forward)
     count = EYE_RINGS
     points = np.vstack([_rings(rim, rim.mean(axis=0), count).reshape(-1, 3), rim.mean(axis=0)])
-    scene = RayScene(vertices, ball_faces)
 
-    def height(at):
-        hits = scene.cast(at + 40.0 * forward, np.broadcast_to(-forward, at.shape))
-        return np.where(np.isfinite(hits.distance), 40.0 - hits.distance, 0.0)
+    def surface_z(at):
+        """Sclera and cornea (0.65 of the radius, 1.1 mm in front of it) at the places' x and y."""
+        off = ((at - center)[:, :2] ** 2).sum(axis=1)
+        cornea = 0.65 * radius
+        sclera = np.sqrt(np.maximum(radius**2 - off, 0.1 * radius**2))
+        return center[2] + np.maximum(sclera, radius + 1.1 - cornea + np.sqrt(np.maximum(cornea**2 - off, 0.0)))
 
-    rim_gap = -height(rim)  # how far the margin stands off the ball
     share = np.repeat(np.linspace(1, 0, count + 1)[1:-1], len(loop)) ** 3
-    lift = height(points)
-    lift[:-1] += share * np.tile(rim_gap, count - 1)
-    return points + lift[:, None] * forward, _ring_faces(loop, count, start)
+    depth = surface_z(points)
+    depth[:-1] += share * np.tile(rim[:, 2] - surface_z(rim), count - 1)
+    points[:, 2] = depth
+    return points, _ring_faces(loop, count, start)
 
 
 def _pit(loop, vertices, outer, start):
@@ -170,19 +174,16 @@ class _Warp:
     def __init__(self, center, radius):
         self.center, self.radius = np.asarray(center, float), float(radius)
 
-    def apply(self, points):
+    def _scaled(self, points, law):
         local = points - self.center
-        r = np.linalg.norm(local, axis=1, keepdims=True)
-        far = np.maximum(r, self.radius)
-        return self.center + local * self.radius * (1 + np.log(far / self.radius)) / far * np.where(
-            r < self.radius, 1.0, 1.0
-        )
+        r = np.maximum(np.linalg.norm(local, axis=1, keepdims=True), 1e-9)
+        return self.center + local * np.where(r > self.radius, self.radius * law(r / self.radius) / r, 1.0)
+
+    def apply(self, points):
+        return self._scaled(points, lambda r: 1 + np.log(np.maximum(r, 1.0)))
 
     def undo(self, points):
-        local = points - self.center
-        r = np.linalg.norm(local, axis=1, keepdims=True)
-        beyond = np.maximum(r / self.radius - 1, 0.0)
-        return self.center + local * np.where(beyond > 0, self.radius * np.exp(beyond) / np.maximum(r, 1e-9), 1.0)
+        return self._scaled(points, lambda r: np.exp(np.maximum(r, 1.0) - 1))
 
 
 def remesh(V, F, n_faces, rng, *, focus=(0.0, -35.0, 10.0), radius=95.0):
@@ -195,9 +196,9 @@ def remesh(V, F, n_faces, rng, *, focus=(0.0, -35.0, 10.0), radius=95.0):
     fine, fine_faces = V, F
     while len(fine_faces) < 5 * n_faces:
         fine, fine_faces = igl.upsample(np.ascontiguousarray(fine), np.ascontiguousarray(fine_faces, dtype=np.int64), 1)
-    fine = _strew(fine, fine_faces, rng)
+    fine = surface.closest(_strew(fine, fine_faces, rng)).points
     coarse, coarse_faces = warp.apply(fine), fine_faces
-    for collapse, count in ((igl.decimate, 2 * n_faces), (igl.qslim, n_faces)):
+    for collapse, count in ((igl.decimate, 2.5 * n_faces), (igl.qslim, n_faces)):
         coarse, coarse_faces, _, _ = collapse(
             np.asfortranarray(coarse), np.asfortranarray(coarse_faces, dtype=np.int32), int(count)
         )

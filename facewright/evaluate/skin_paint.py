@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.evaluate.procedural import fractal_noise, smoothstep, speckles, value_noise
+from facewright.evaluate.scanner import eyeball
 from facewright.mesh.closest import Surface, interpolate
 
 BROW_POINTS = {"right": (70, 63, 105, 66, 107), "left": (336, 296, 334, 293, 300)}
@@ -58,7 +59,7 @@ class HeadPaint:
         self.brows = cKDTree(self.surface.closest(_brow_points(template, vertices)).points)
         nostrils = vertices[regions["nostrils"] & ~regions["outer"]]
         self.nostrils = cKDTree(nostrils) if len(nostrils) else None
-        self.eyes = [_eyeball(vertices[template.part(name).vertex_slice]) for name in ("eye_left", "eye_right")]
+        self.eyes = [eyeball(vertices[template.part(name).vertex_slice]) for name in ("eye_left", "eye_right")]
 
     def skin(self, points):
         """(k, 3) sRGB colours of points on skin and lips."""
@@ -129,12 +130,6 @@ def _dense(vertices, lines, step=0.4):
     return np.vstack(pieces)
 
 
-def _eyeball(points):
-    """centre (3,) and radius of an eyeball's vertices."""
-    center = (points.max(axis=0) + points.min(axis=0)) / 2
-    return center, float((points.max(axis=0) - points.min(axis=0))[:2].mean() / 2)
-
-
 def _brow_points(template, vertices):
     """Points along both brows: the template's landmarks where it has them, else an arc above each eye."""
     marks = template.landmarks
@@ -146,7 +141,7 @@ def _brow_points(template, vertices):
         if all(name in place for name in names):
             points = positions[[place[name] for name in names]]
         else:
-            center, radius = _eyeball(vertices[template.part(f"eye_{side}").vertex_slice])
+            center, radius = eyeball(vertices[template.part(f"eye_{side}").vertex_slice])
             outward = 1.0 if side == "left" else -1.0
             t = np.linspace(-1, 1, 9)[:, None]
             points = center + t * [outward * 20.0, 0, 0] + (1 - t**2) * [0, 4.0, 0] + [0, 1.6 * radius, 1.2 * radius]

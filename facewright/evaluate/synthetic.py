@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from facewright.data import Scan
 from facewright.evaluate.clutter import collar, hair_height, strands
 from facewright.evaluate.procedural import fractal_noise
-from facewright.evaluate.scanner import remesh, scanner_surface
+from facewright.evaluate.scanner import eyeball, remesh, scanner_surface
 from facewright.evaluate.skin_paint import Complexion, HeadPaint, random_complexion
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
@@ -38,7 +38,7 @@ class SyntheticOptions:
     complexion     drawn from the seed where None
     """
 
-    n_faces: int = 60000
+    n_faces: int = 90000
     noise_mm: float = 0.15
     hair_mm: float = 9.0
     strands: int = 18
@@ -76,8 +76,8 @@ def random_identity(template, seed, scale=0.9):
 
 def centered_between_eyes(vertices, template):
     """vertices (n, 3) shifted so that the middle between the eyeballs' centres is the origin."""
-    eyes = [vertices[template.part(name).vertex_slice] for name in ("eye_left", "eye_right")]
-    return vertices - np.mean([(eye.max(axis=0) + eye.min(axis=0)) / 2 for eye in eyes], axis=0)
+    eyes = [eyeball(vertices[template.part(name).vertex_slice])[0] for name in ("eye_left", "eye_right")]
+    return vertices - np.mean(eyes, axis=0)
 
 
 def with_fewer_modes(template, count=20):
