@@ -16,22 +16,23 @@ def hair_height(points, scalp_depth, seed, *, thickness=9.0):
 
 
 def strands(surface, starts, directions, rng, *, length=45.0, width=4.0, height=3.0):
-    """Ribbons that run over a surface: V (k, 3), F (m, 3).
+    """Ribbons that run over a surface: V (k, 3), F (m, 3), roots (s,) index of the vertex where each begins.
 
     surface a Surface; starts (s, 3) points on it, directions (s, 3) to run in; height mm above it, curling
     """
     normals = vertex_normals(surface.vertices, surface.faces)
-    points, faces, offset = [], [], 0
+    points, faces, roots, offset = [], [], [], 0
     for start, direction in zip(starts, directions):
         steps = rng.integers(8, 15)
         ribbon = _ribbon(surface, normals, start, direction, rng, steps, length / 12, width, height)
         quads = offset + 2 * np.arange(steps - 1)[:, None] + np.array([[0, 1, 3, 2]])
         points.append(ribbon)
+        roots.append(offset)
         faces += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
         offset += len(ribbon)
     if not points:
-        return np.empty((0, 3)), np.empty((0, 3), np.int64)
-    return np.vstack(points), np.vstack(faces)
+        return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty(0, np.int64)
+    return np.vstack(points), np.vstack(faces), np.array(roots)
 
 
 def _ribbon(surface, normals, start, direction, rng, steps, stride, width, height):
@@ -70,4 +71,4 @@ def collar(V, F, y_bottom, rng, *, opening_deg=28.0, columns=96):
     grid = np.arange(len(rows) * columns).reshape(len(rows), columns)
     a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
     quads = np.stack([a, b, c, d], axis=2).reshape(-1, 4)
-    return np.vstack(points), np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return np.vstack(points), np.vstack([quads[:, [0, 2, 1]], quads[:, [0, 3, 2]]])

@@ -127,10 +127,16 @@ def make_head(template, vertices, rng, seed, options):
     seen = seen + rng.normal(0.0, options.noise_mm, len(seen))[:, None] * normals
     chin = chin_height(template, vertices)
     kept = _kept(points[faces].mean(axis=1), template, vertices, chin, rng, seed, options)
-    head = [(seen, faces[kept], points, kind[kept])]
+    faces, kind = faces[kept], kind[kept]
     if options.strands and options.hair_mm > 0:
-        ribbons, ribbon_faces = strands(Surface(seen, faces), *_strand_starts(points, depth, options.strands, rng), rng)
-        head.append((ribbons, ribbon_faces, ribbons, np.full(len(ribbon_faces), HAIR)))
+        chosen, directions = _strand_starts(points, depth, faces, options.strands, rng)
+        ribbons, more, roots = strands(Surface(seen, faces), seen[chosen], directions, rng)
+        more = more + len(seen)
+        for root, vertex in zip(roots, chosen):  # a strand hangs on a vertex of the head, else it is a loose crumb
+            more[more == root + len(seen)] = vertex
+        seen, points = np.vstack([seen, ribbons]), np.vstack([points, ribbons])
+        faces, kind = np.vstack([faces, more]), np.append(kind, np.full(len(more), HAIR))
+    head = [(seen, faces, points, kind)]
     if options.collar:
         cloth, cloth_faces = collar(V, F, max(chin - 48.0, V[:, 1].min() + 5.0), rng)
         head.append((cloth, cloth_faces, cloth, np.full(len(cloth_faces), CLOTH)))
@@ -182,15 +188,17 @@ def _kept(centers, template, vertices, chin, rng, seed, options):
     return kept
 
 
-def _strand_starts(points, depth, count, rng):
-    """Points just inside the hairline of forehead and temples, and the directions in which strands leave them."""
+def _strand_starts(points, depth, faces, count, rng):
+    """Vertices just inside the hairline of forehead and temples, and the directions (s, 3) of strands from there."""
+    there = np.zeros(len(points), bool)
+    there[faces] = True
     middle = np.median(points[depth > 0, 2])
-    front = np.flatnonzero((depth > 2.0) & (depth < 14.0) & (points[:, 2] > middle) & (points[:, 1] > 0.0))
-    if not len(front):
-        return np.empty((0, 3)), np.empty((0, 3))
-    chosen = rng.choice(front, count)
-    sideways = np.sign(points[chosen, 0])[:, None] * [1.0, 0.0, 0.0] * rng.uniform(0.2, 1.0, (count, 1))
-    return points[chosen], sideways + [0.0, -0.6, 0.3] + rng.normal(0, 0.25, (count, 3))
+    front = (depth > 2.0) & (depth < 14.0) & (points[:, 2] > middle) & (points[:, 1] > 0.0)
+    chosen = np.flatnonzero(there & front)
+    if len(chosen):
+        chosen = rng.choice(chosen, count)
+    sideways = np.sign(points[chosen, 0])[:, None] * [1.0, 0.0, 0.0] * rng.uniform(0.2, 1.0, (len(chosen), 1))
+    return chosen, sideways + [0.0, -0.6, 0.3] + rng.normal(0, 0.25, (len(chosen), 3))
 
 
 def small_motion(rng, degrees, millimetres):
