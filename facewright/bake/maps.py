@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facewright.bake.fill import feather, solve_fill
+from facewright.bake.fill import feather, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
 from facewright.bake.project import project_to_scan
 from facewright.bake.pyramid import push_pull
@@ -22,12 +22,14 @@ from facewright.bake.texels import (
     gather_at_vertices,
     in_chunks,
     texel_densities,
+    unit_rows,
 )
-from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.normals import vertex_normals
 from facewright.mesh.render import linear_to_srgb
 from facewright.mesh.tangents import corner_tangents, to_tangent_space
 
 SEEN, FILLED, INSIDE = 255, 128, 0
+SPECK_MM = 6.0
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
 
 
@@ -115,7 +117,16 @@ def _skin_of(face):
     outer = np.zeros(n, bool)
     outer[F[outer_faces].ravel()] = True
     FT = template.uv_faces[template.skin.face_slice]
-    return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, face.observed[:n])
+    observed = _without_specks(face.fit[:n], F, face.observed[:n] | ~outer)
+    return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, observed)
+
+
+def _without_specks(V, F, observed):
+    """(n,) bool: observed, but for holes narrower than twice SPECK_MM. A fit that was led by lines or stiff there lies
+    on the scan all the same, and rays find out whether it does.
+    """
+    core = ~observed & (surface_distance(V, F, observed, SPECK_MM) >= SPECK_MM)
+    return observed | (surface_distance(V, F, core, SPECK_MM) >= SPECK_MM)
 
 
 def _default_skin(template):
@@ -151,12 +162,12 @@ def _look(scan, skin, texels, hits, size, jobs):
         face, barycentric, on_scan = texels.face[at], texels.barycentric[at], hits.face[at]
         spacing = texel_mm[face]
         colors[at], colored[at] = looks.colors(on_scan, hits.barycentric[at], spacing)
-        normal = normalized(at_points(normals, skin.F, face, barycentric))
-        tangent = normalized(at_corners(tangents, face, barycentric))
+        normal = unit_rows(at_points(normals, skin.F, face, barycentric))
+        tangent = unit_rows(at_corners(tangents, face, barycentric))
         direction = looks.normals(on_scan, hits.barycentric[at], spacing)
         bend = to_tangent_space(direction, normal, tangent, signs[face])
         bend[:, 2] = np.maximum(bend[:, 2], 0.1)  # a normal map cannot turn a surface away from the viewer
-        bends[at] = normalized(bend)[:, :2]
+        bends[at] = unit_rows(bend)[:, :2]
 
     in_chunks(work, len(seen), jobs)
     return colors, colored, bends, met
@@ -184,7 +195,7 @@ def _compose_albedo(template, skin, texels, colors, colored, fill, jobs):
         result[piece] = own * weight + filled * (1 - weight)
 
     in_chunks(work, len(texels), jobs)
-    image = _spread(texels, result, np.ones(len(texels), bool))
+    image = _spread(texels, result, np.ones(len(texels), bool), gutters=True)
     return _bytes(image).reshape(size, size, 3)
 
 
@@ -198,7 +209,7 @@ def _compose_normal(skin, texels, bends, met, weight, jobs):
         result[piece] = seen[texels.index[piece]] * share[:, None]
 
     in_chunks(work, len(texels), jobs)
-    xy = _spread(texels, result, np.ones(len(texels), bool))
+    xy = _spread(texels, result, np.ones(len(texels), bool), gutters=True)
     z = np.sqrt(np.maximum(1.0 - (xy * xy).sum(1, keepdims=True), 0.0))
     return _bytes(np.concatenate([xy, z], axis=1) * 127.0 + 128.0).reshape(texels.size, texels.size, 3)
 
@@ -216,14 +227,18 @@ def _coverage(skin, texels, seen, weight, can_see, jobs):
     return result.reshape(texels.size, texels.size)
 
 
-def _spread(texels, values, valid):
-    """(size * size, c) float32: values (k, c) of the valid texels at their places, every other place filled in."""
+def _spread(texels, values, valid, gutters=False):
+    """(size * size, c) float32: values (k, c) of the valid texels at their places, the other texels filled in between
+    them, and with gutters what lies outside the charts too.
+    """
     size, channels = texels.size, values.shape[1]
     image = np.zeros((size * size, channels), np.float32)
-    weights = np.zeros(size * size, np.float32)
+    weights, wanted = np.zeros(size * size, np.float32), np.full(size * size, gutters)
     at = texels.index[valid]
-    image[at], weights[at] = values[valid], 1.0
-    return push_pull(image.reshape(size, size, channels), weights.reshape(size, size)).reshape(-1, channels)
+    image[at], weights[at], wanted[texels.index] = values[valid], 1.0, True
+    square = (size, size)
+    filled = push_pull(image.reshape(*square, channels), weights.reshape(square), wanted.reshape(square))
+    return filled.reshape(-1, channels)
 
 
 def _bytes(image):

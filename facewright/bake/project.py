@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facewright.bake.texels import at_points, in_chunks
+from facewright.bake.texels import at_points, dots, in_chunks, unit_rows
 from facewright.mesh.closest import Surface
-from facewright.mesh.normals import face_normals, normalized
+from facewright.mesh.normals import face_normals
 from facewright.mesh.raster import RayScene
 
 OVERLAP_MM = 0.05
@@ -42,7 +42,7 @@ def project_to_scan(scan, V, F, N, texels, wanted, max_distance_mm=3.0, jobs=1):
 
     def points_and_normals(which):
         face, barycentric = texels.face[which], texels.barycentric[which]
-        return at_points(V, F, face, barycentric), normalized(at_points(N, F, face, barycentric))
+        return at_points(V, F, face, barycentric), unit_rows(at_points(N, F, face, barycentric))
 
     def nearest_hit(which, reach):
         points, normals = points_and_normals(which)
@@ -55,7 +55,7 @@ def project_to_scan(scan, V, F, N, texels, wanted, max_distance_mm=3.0, jobs=1):
             rays = normals * side
             hits = scene.cast(points - rays * np.float32(OVERLAP_MM), rays, reach + OVERLAP_MM)
             offset = (side * (hits.distance - OVERLAP_MM)).astype(np.float32)
-            agrees = (hits.face >= 0) & ((scan_normals[hits.face] * normals).sum(1) > cos_limit)
+            agrees = (hits.face >= 0) & (dots(scan_normals[hits.face], normals) > cos_limit)
             better = agrees & (np.abs(offset) < np.abs(chosen.offset))
             chosen.face[better] = hits.face[better]
             chosen.barycentric[better] = hits.barycentric[better]
@@ -91,9 +91,9 @@ def _take_nearest(result, scan, scan_normals, missed, points_and_normals, reach,
         return
     points, normals = points_and_normals(missed)
     found = Surface(scan.vertices, scan.faces).closest(points)
-    agrees = (found.distance < reach) & ((scan_normals[found.faces] * normals).sum(1) > cos_limit)
+    agrees = (found.distance < reach) & (dots(scan_normals[found.faces], normals) > cos_limit)
     taken = missed[agrees]
     result.face[taken] = found.faces[agrees]
     result.barycentric[taken] = found.barycentric[agrees]
     away = found.points[agrees] - points[agrees]
-    result.offset[taken] = (away * normals[agrees]).sum(1)
+    result.offset[taken] = dots(away, normals[agrees])

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 
-def push_pull(values, weights):
+def push_pull(values, weights, wanted=None):
     """(h, w, c) float32 without gaps, of values (h, w, c) with weights (h, w) in 0..1, 0 where a texel is empty.
 
     Texels of weight 1 stay as they are. Averages down to one texel, then fills upwards bilinearly: smooth, and at a
-    chart's border close to the border's own colour, which is what gutters want.
+    chart's border close to the border's own colour, which is what gutters want. wanted (h, w) bool limits which empty
+    texels are filled; the others keep what they have.
     """
     height, width = weights.shape
     if weights.min() >= 1.0:
@@ -20,7 +21,7 @@ def push_pull(values, weights):
     weights = np.asarray(weights, np.float32)
     coarse, coarse_weights = _reduce(values, weights)
     filled = push_pull(coarse, coarse_weights)
-    empty = weights < 1.0
+    empty = weights < 1.0 if wanted is None else (weights < 1.0) & wanted
     result = values.copy()
     rows, columns = np.nonzero(empty)
     below = _bilinear_parent(filled, rows, columns)

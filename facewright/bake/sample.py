@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.bake.texels import at_corners, at_points
+from facewright.bake.texels import at_corners, at_points, unit_rows
 from facewright.mesh.adjacency import half_edges
 from facewright.mesh.normals import face_areas, normalized, vertex_normals
 from facewright.mesh.tangents import corner_tangents, from_tangent_space
@@ -61,11 +61,11 @@ class ScanLooks:
 
     def normals(self, face, barycentric, texel_mm):
         """(k, 3) unit normals: the smooth ones of the scan's mesh, turned by its normal map if it has one."""
-        normals = normalized(at_points(self.vertex_normals, self.scan.faces, face, barycentric))
+        normals = unit_rows(at_points(self.vertex_normals, self.scan.faces, face, barycentric))
         if self.normal_pyramid is None:
             return normals
         texture = self._sample(self.normal_pyramid, face, barycentric, texel_mm) / 127.5 - 1.0
-        tangents = normalized(at_corners(self.tangents, face, barycentric))
+        tangents = unit_rows(at_corners(self.tangents, face, barycentric))
         return from_tangent_space(texture, normals, tangents, self.signs[face].astype(np.float32))
 
     def _sample(self, pyramid, face, barycentric, texel_mm):

@@ -61,12 +61,12 @@ def to_tangent_space(directions, normals, tangents, sign):
     viewer's bitangent is sign * cross(N, T), normalised.
     """
     cross = np.cross(normals, tangents)
-    cross = cross / np.maximum(np.sqrt((cross * cross).sum(1, keepdims=True)), 1e-12) * sign[:, None]
-    skew = np.clip((tangents * normals).sum(1), -0.99, 0.99)
-    on_t, on_n = (directions * tangents).sum(1), (directions * normals).sum(1)
+    cross *= (sign / np.maximum(np.sqrt(_dots(cross, cross)), 1e-12))[:, None]
+    skew = np.clip(_dots(tangents, normals), -0.99, 0.99)
+    on_t, on_n = _dots(directions, tangents), _dots(directions, normals)
     scale = 1.0 / (1.0 - skew * skew)
     x, z = (on_t - skew * on_n) * scale, (on_n - skew * on_t) * scale
-    return np.stack([x, (directions * cross).sum(1), z], axis=1)
+    return np.stack([x, _dots(directions, cross), z], axis=1)
 
 
 def from_tangent_space(coefficients, normals, tangents, sign):
@@ -74,3 +74,7 @@ def from_tangent_space(coefficients, normals, tangents, sign):
     bitangents = normalized(np.cross(normals, tangents)) * sign[:, None]
     x, y, z = coefficients[:, :1], coefficients[:, 1:2], coefficients[:, 2:]
     return normalized(x * tangents + y * bitangents + z * normals)
+
+
+def _dots(a, b):
+    return np.einsum("ij,ij->i", a, b)
