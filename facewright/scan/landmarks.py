@@ -10,8 +10,10 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from facewright.data import Landmarks
+from facewright.mesh.adjacency import unique_edges, vertex_adjacency
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_normals, vertex_normals
 from facewright.mesh.raster import Camera, RayScene
@@ -108,21 +110,38 @@ def cast_pixels(scene, camera, pixels):
     return scene.cast(origins, np.broadcast_to(-camera.R[2], origins.shape))
 
 
-def sight_landmarks(vertices, faces, wardrobe, cameras, *, unlit=False):
+def shading_normals(vertices, faces, *, reach=2.0):
+    """(n, 3) vertex normals, averaged over about reach (in the unit of vertices, about 2 mm).
+
+    Finer detail is noise, or the facets of a coarse mesh that was subdivided; the landmarker should see neither.
+    """
+    normals = vertex_normals(vertices, faces)
+    edges = unique_edges(faces)
+    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    passes = int(np.clip(np.round((reach / np.median(lengths)) ** 2), 0, 32))
+    ring = vertex_adjacency(faces, len(vertices)) + sp.identity(len(vertices), format="csr")
+    for _ in range(passes):
+        normals = ring @ normals  # only the direction counts
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return normals
+
+
+def sight_landmarks(vertices, faces, wardrobe, cameras, *, normals=None, unlit=False):
     """Sightings of a mesh by cameras, one list entry for each Looks of the wardrobe.
 
-    vertices (n, 3) in our frame or near it, about mm; faces (m, 3)
+    vertices (n, 3) in our frame or near it, about mm; faces (m, 3); normals (n, 3) to shade with
     unlit    show textures and colours as they are; clay is always lit
     """
     scene = RayScene(vertices, faces)
-    of_faces, of_vertices = face_normals(vertices, faces), vertex_normals(vertices, faces)
+    of_faces = face_normals(vertices, faces)
+    normals = shading_normals(vertices, faces) if normals is None else normals
     seen = np.zeros(len(faces), bool)
     points, facing = [[] for _ in wardrobe], [[] for _ in wardrobe]
     for camera in cameras:
         hits = scene.cast(*camera.rays())
         seen[hits.face[hits.face >= 0]] = True
         for number, looks in enumerate(wardrobe):
-            picture = {"normals": of_vertices, "unlit": unlit and looks is not CLAY_LOOKS, "hits": hits}
+            picture = {"normals": normals, "unlit": unlit and looks is not CLAY_LOOKS, "hits": hits}
             image, _ = render_with_hits(vertices, faces, camera, **vars(looks), **picture)
             pixels = detect_both_ways(image)
             if pixels is None:

@@ -26,6 +26,7 @@ from facewright.scan.landmarks import (
     face_cameras,
     fuse_sightings,
     join_sightings,
+    shading_normals,
     sight_landmarks,
 )
 from facewright.scan.orientation import (
@@ -94,14 +95,16 @@ def find_landmarks(scan, options=LandmarkOptions()):
     _check_options(options)
     scan = _mirrored(scan) if options.mirror else scan
     T, warnings = _stand_up(scan, options)
-    standing = scan.transformed(T)
-    flipped = _is_upside_down(standing)
+    normals = shading_normals(scan.vertices, scan.faces, reach=2.0 / np.cbrt(np.linalg.det(T[:3, :3])))
+    flipped = _is_upside_down(scan, T, normals)
     if flipped:
-        scan, standing = _with_uv_flipped(scan), _with_uv_flipped(standing)
+        scan = _with_uv_flipped(scan)
         warnings.append("the texture was upside down (V of the file runs downward); it was turned")
-    wardrobe = wardrobe_of(standing)
     for views in (QUICK_VIEWS, VIEWS):
-        landmarks, T, residual = _look_again(scan, T, wardrobe, views)
+        sightings = _sight(scan, T, wardrobe_of(scan), views, normals)
+        landmarks = fuse_sightings(transform(T, scan.vertices), scan.faces, join_sightings(sightings))
+        guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
+        T = guess.T
     landmarks = place_landmarks(landmarks, options.landmarks, scan.transformed(T))
     T = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights).T
     ipd = _pupil_distance(scan, landmarks)
@@ -109,7 +112,7 @@ def find_landmarks(scan, options=LandmarkOptions()):
     T = _rescaled(T, unit_mm)
     aligned = scan.transformed(T)
     stats = {
-        "residual_mm": residual,
+        "residual_mm": guess.residual_mm,
         "ipd_mm": float(ipd * unit_mm),
         "agreement": float(landmarks.weights[list(STABLE)].mean()),
     }
@@ -196,17 +199,22 @@ def _confirmed(vertices, faces, looks, guess):
     return found.T @ guess.T
 
 
-def _is_upside_down(standing):
+def _sight(scan, T, wardrobe, views, normals, *, unlit=False):
+    """Sightings of a scan in the frame T, one for each Looks; normals (n, 3) in the scan's own frame."""
+    turned = normals @ T[:3, :3].T / np.cbrt(np.linalg.det(T[:3, :3]))
+    vertices, cameras = transform(T, scan.vertices), face_cameras(views)
+    return sight_landmarks(vertices, scan.faces, wardrobe, cameras, normals=turned, unlit=unlit)
+
+
+def _is_upside_down(scan, T, normals):
     """Whether the texture fits the shape only with V turned: its landmarks are held against the clay's.
 
     The pictures are unlit, so that nothing but the texture speaks.
     """
-    if not standing.has_texture:
+    if not scan.has_texture:
         return False
-    flipped = _with_uv_flipped(standing)
-    wardrobe = [CLAY_LOOKS, _worn(standing), _worn(flipped)]
-    cameras = face_cameras(FLIP_VIEWS)
-    clay, upright, turned = sight_landmarks(standing.vertices, standing.faces, wardrobe, cameras, unlit=True)
+    wardrobe = [CLAY_LOOKS, _worn(scan), _worn(_with_uv_flipped(scan))]
+    clay, upright, turned = _sight(scan, T, wardrobe, FLIP_VIEWS, normals, unlit=True)
     if not len(clay.points):
         return False
     stable = list(STABLE)
@@ -223,15 +231,6 @@ def _is_upside_down(standing):
 def _with_uv_flipped(scan):
     normals = scan.normal_map
     return replace(scan, uv=scan.uv * [1.0, -1.0] + [0.0, 1.0], normal_map=normals)
-
-
-def _look_again(scan, T, wardrobe, views):
-    """Landmarks from views about the face in the frame T, the frame they give, and their residual (mm)."""
-    standing = transform(T, scan.vertices)
-    sightings = sight_landmarks(standing, scan.faces, wardrobe, face_cameras(views))
-    landmarks = fuse_sightings(standing, scan.faces, join_sightings(sightings))
-    guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
-    return landmarks, guess.T, guess.residual_mm
 
 
 def _pupil_distance(scan, landmarks):
