@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from facewright.mesh.closest import interpolate
-from facewright.mesh.normals import face_areas, vertex_normals
-from facewright.mesh.raster import Camera, RayScene
+from facewright.mesh.normals import face_areas
+from facewright.mesh.raster import Camera
 from facewright.mesh.render import render_with_hits
 from facewright.scan.detector import canonical_landmarks, detect_landmarks
-from facewright.scan.landmarks import STABLE, cast_pixels
+from facewright.scan.landmarks import STABLE
+from facewright.scan.sightings import cast_pixels, transform
 
 SEARCH_SIZE = 256
 # A head in a picture of the whole mesh: the mesh is brought to this radius about the origin.
@@ -68,11 +69,6 @@ def fit_canonical(points, weights, *, rounds=5):
     return Guess(T, float(np.sqrt(np.average(misfit**2, weights=given + 1e-12))))
 
 
-def transform(T, points):
-    """T x for points (k, 3)."""
-    return points @ T[:3, :3].T + T[:3, 3]
-
-
 def search_frame(vertices, faces):
     """T (4, 4) that brings a mesh about the origin, nearly all of it within SEARCH_RADIUS_MM."""
     areas = face_areas(vertices, faces)
@@ -108,23 +104,23 @@ def search_directions():
             yield np.stack([right, up, backward])
 
 
-def search_faces(vertices, faces, looks, *, up=None):
+def search_faces(subject, looks, *, up=None):
     """Guesses of where a face is, as they turn up, the most usual orientations first; a generator of Guess.
 
-    vertices (n, 3) in the frame of search_frame; looks a landmarks.Looks
+    subject  a Subject in the frame of search_frame; looks: Looks to show it in
     up       (3,) unit vector: only faces that stand within 60 degrees of it
     """
-    scene, normals = RayScene(vertices, faces), vertex_normals(vertices, faces)
     for R in search_directions():
         camera = Camera(R, np.zeros(3), 1.05 * SEARCH_RADIUS_MM, (SEARCH_SIZE, SEARCH_SIZE))
-        hits = scene.cast(*camera.rays())
-        picture, _ = render_with_hits(vertices, faces, camera, **vars(looks), normals=normals, hits=hits)
+        hits = subject.scene.cast(*camera.rays())
+        wearing = {**vars(looks), "normals": subject.normals, "hits": hits}
+        picture, _ = render_with_hits(subject.vertices, subject.faces, camera, **wearing)
         for quarter in range(4):
             pixels = detect_landmarks(np.rot90(picture, quarter))
             if pixels is None:
                 continue
-            lifted = cast_pixels(scene, camera, _unturn(pixels, quarter))
-            guess = _judge(vertices, faces, lifted, R)
+            lifted = cast_pixels(subject.scene, camera, _unturn(pixels, quarter))
+            guess = _judge(subject, lifted, R)
             if guess is not None and (up is None or guess.T[1, :3] @ up > 0.5 * np.linalg.norm(guess.T[1, :3])):
                 yield guess
 
@@ -136,12 +132,12 @@ def _unturn(pixels, quarter):
     return pixels
 
 
-def _judge(vertices, faces, lifted, R):
+def _judge(subject, lifted, R):
     """A Guess, or None for what is no face: rays into the void, a face that looks away, no face's proportions."""
     hit = lifted.face >= 0
     if hit[list(STABLE)].mean() < 0.9:
         return None
-    points = interpolate(vertices, faces, lifted.face, lifted.barycentric)
+    points = interpolate(subject.vertices, subject.faces, lifted.face, lifted.barycentric)
     guess = fit_canonical(points, hit.astype(float))
     scale = np.linalg.norm(guess.T[2, :3])
     if guess.residual_mm > DOUBTFUL_MM or guess.T[2, :3] @ R[2] < 0.3 * scale:

@@ -12,29 +12,18 @@ import numpy as np
 from facewright.conventions import INTERPUPILLARY_MM, MM_PER_UNIT
 from facewright.data import Landmarks, Scan
 from facewright.errors import InputError
-from facewright.mesh.render import srgb_to_linear
 from facewright.scan.clean import far_components, keep_faces, turn_faces
 from facewright.scan.detector import LANDMARK_NAMES
 from facewright.scan.landmark_files import landmark_index, place_landmarks
-from facewright.scan.landmarks import (
+from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, STABLE, VIEWS, face_cameras, fuse_sightings
+from facewright.scan.orientation import BELIEVED_MM, fit_canonical, search_faces, search_frame
+from facewright.scan.sightings import (
     CLAY_LOOKS,
-    EYE_LEFT,
-    EYE_RIGHT,
-    STABLE,
-    VIEWS,
-    Looks,
-    face_cameras,
-    fuse_sightings,
+    Subject,
     join_sightings,
-    shading_normals,
     sight_landmarks,
-)
-from facewright.scan.orientation import (
-    BELIEVED_MM,
-    fit_canonical,
-    search_faces,
-    search_frame,
     transform,
+    worn_looks,
 )
 
 QUICK_VIEWS = ((-20.0, 0.0), (0.0, -15.0), (0.0, 0.0), (0.0, 15.0), (20.0, 0.0))
@@ -94,18 +83,17 @@ def find_landmarks(scan, options=LandmarkOptions()):
     """
     _check_options(options)
     scan = _mirrored(scan) if options.mirror else scan
-    T, warnings = _stand_up(scan, options)
-    normals = shading_normals(scan.vertices, scan.faces, reach=2.0 / np.cbrt(np.linalg.det(T[:3, :3])))
-    flipped = _is_upside_down(scan, T, normals)
+    to_search = search_frame(scan.vertices, scan.faces)
+    subject = Subject.of(transform(to_search, scan.vertices), scan.faces)
+    T, warnings = _stand_up(scan, subject, to_search, options)
+    flipped = _is_upside_down(scan, subject, T)
     if flipped:
         scan = _with_uv_flipped(scan)
         warnings.append("the texture was upside down (V of the file runs downward); it was turned")
     for views in (QUICK_VIEWS, VIEWS):
-        sightings = _sight(scan, T, wardrobe_of(scan), views, normals)
-        landmarks = fuse_sightings(transform(T, scan.vertices), scan.faces, join_sightings(sightings))
-        guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
+        landmarks, guess = _look(subject, T, wardrobe_of(scan), views)
         T = guess.T
-    landmarks = place_landmarks(landmarks, options.landmarks, scan.transformed(T))
+    landmarks = place_landmarks(landmarks, options.landmarks, scan)
     T = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights).T
     ipd = _pupil_distance(scan, landmarks)
     unit_mm, source, more = choose_unit(ipd, scan.unit_mm, MM_PER_UNIT.get(options.units))
@@ -137,36 +125,27 @@ def _mirrored(scan):
 
 def wardrobe_of(scan):
     """The Looks in which a scan is shown to the landmarker: as it is, if it has texture or colours, and in clay."""
-    looks = [_worn(scan)] if scan.has_texture or scan.colors is not None else []
-    return [*looks, CLAY_LOOKS]
+    looks = worn_looks(scan)
+    return [CLAY_LOOKS] if looks is None else [looks, CLAY_LOOKS]
 
 
-def _worn(scan):
-    """Looks of a textured or coloured scan. Several textures are carried to colours at the vertices."""
-    if scan.has_texture:
-        return Looks(scan.textures[0], scan.uv, scan.uv_faces)
-    return Looks(colors=srgb_to_linear(scan.colors))
-
-
-def _stand_up(scan, options):
-    """T (4, 4) that roughly brings the scan into our frame at 63 mm between the eyes, and warnings."""
+def _stand_up(scan, subject, to_search, options):
+    """T (4, 4) that roughly brings the subject into our frame at 63 mm between the eyes, and warnings."""
     by_hand = _stand_by_hand(scan, options.landmarks)
     if by_hand is not None:
-        return by_hand, []
-    to_search = search_frame(scan.vertices, scan.faces)
-    vertices = transform(to_search, scan.vertices)
+        return by_hand @ np.linalg.inv(to_search), []
     up = None if options.up is None else np.array(AXES[options.up.lower()], float) * [-1 if options.mirror else 1, 1, 1]
     doubtful = []
     for looks in reversed(wardrobe_of(scan)):  # clay first: it cannot lie upside down
-        for guess in search_faces(vertices, scan.faces, looks, up=up):
+        for guess in search_faces(subject, looks, up=up):
             if guess.residual_mm > BELIEVED_MM:
-                doubtful.append((guess.residual_mm, looks, guess))
-            elif (T := _confirmed(vertices, scan.faces, looks, guess)) is not None:
-                return T @ to_search, []
-    doubtful.sort(key=lambda entry: entry[0])
-    for _, looks, guess in doubtful[:4]:
-        if (T := _confirmed(vertices, scan.faces, looks, guess)) is not None:
-            return T @ to_search, ["the face was hard to find; check the landmarks"]
+                doubtful.append((guess, looks))
+            elif (T := _confirmed(subject, looks, guess)) is not None:
+                return T, []
+    doubtful.sort(key=lambda entry: entry[0].residual_mm)
+    for guess, looks in doubtful[:4]:
+        if (T := _confirmed(subject, looks, guess)) is not None:
+            return T, ["the face was hard to find; check the landmarks"]
     raise InputError(
         f"{scan.name}: no face was found on it; check that it is a head, or give a few landmarks with --landmarks"
     )
@@ -183,38 +162,36 @@ def _stand_by_hand(scan, overrides):
     return fit_canonical(points, weights).T if weights.sum() >= 4 else None
 
 
-def _confirmed(vertices, faces, looks, guess):
+def _confirmed(subject, looks, guess):
     """The frame of a guess after a second look from five sides, or None where they do not agree on a face."""
-    standing = transform(guess.T, vertices)
-    sightings = sight_landmarks(standing, faces, [looks], face_cameras(QUICK_VIEWS))[0]
-    if sightings.missed > 1:
+    landmarks, found = _look(subject, guess.T, [looks], QUICK_VIEWS, may_miss=1)
+    if landmarks is None or found.residual_mm > BELIEVED_MM or landmarks.weights[list(STABLE)].mean() < 0.4:
         return None
-    landmarks = fuse_sightings(standing, faces, sightings)
-    found = fit_canonical(landmarks.positions(standing, faces), landmarks.weights)
-    turned = np.degrees(
-        np.arccos(np.clip((np.trace(found.T[:3, :3]) / np.cbrt(np.linalg.det(found.T[:3, :3])) - 1) / 2, -1, 1))
-    )
-    if found.residual_mm > BELIEVED_MM or turned > 35.0 or landmarks.weights[list(STABLE)].mean() < 0.4:
-        return None
-    return found.T @ guess.T
+    turn = guess.T[:3, :3] @ found.T[:3, :3].T
+    cosine = (np.trace(turn) / np.cbrt(np.linalg.det(turn)) - 1) / 2
+    return found.T if cosine > np.cos(np.radians(35.0)) else None
 
 
-def _sight(scan, T, wardrobe, views, normals, *, unlit=False):
-    """Sightings of a scan in the frame T, one for each Looks; normals (n, 3) in the scan's own frame."""
-    turned = normals @ T[:3, :3].T / np.cbrt(np.linalg.det(T[:3, :3]))
-    vertices, cameras = transform(T, scan.vertices), face_cameras(views)
-    return sight_landmarks(vertices, scan.faces, wardrobe, cameras, normals=turned, unlit=unlit)
+def _look(subject, T, wardrobe, views, *, may_miss=None):
+    """Landmarks from views about the face that stands in the frame T, and the Guess they give; None, None where more
+    than may_miss views find no face.
+    """
+    sightings = join_sightings(sight_landmarks(subject, T, wardrobe, face_cameras(views)))
+    if may_miss is not None and sightings.missed > may_miss:
+        return None, None
+    landmarks = fuse_sightings(subject, T, sightings)
+    return landmarks, fit_canonical(landmarks.positions(subject.vertices, subject.faces), landmarks.weights)
 
 
-def _is_upside_down(scan, T, normals):
+def _is_upside_down(scan, subject, T):
     """Whether the texture fits the shape only with V turned: its landmarks are held against the clay's.
 
     The pictures are unlit, so that nothing but the texture speaks.
     """
     if not scan.has_texture:
         return False
-    wardrobe = [CLAY_LOOKS, _worn(scan), _worn(_with_uv_flipped(scan))]
-    clay, upright, turned = _sight(scan, T, wardrobe, FLIP_VIEWS, normals, unlit=True)
+    wardrobe = [CLAY_LOOKS, worn_looks(scan), worn_looks(_with_uv_flipped(scan))]
+    clay, upright, turned = sight_landmarks(subject, T, wardrobe, face_cameras(FLIP_VIEWS), unlit=True)
     if not len(clay.points):
         return False
     stable = list(STABLE)
@@ -229,8 +206,7 @@ def _is_upside_down(scan, T, normals):
 
 
 def _with_uv_flipped(scan):
-    normals = scan.normal_map
-    return replace(scan, uv=scan.uv * [1.0, -1.0] + [0.0, 1.0], normal_map=normals)
+    return replace(scan, uv=scan.uv * [1.0, -1.0] + [0.0, 1.0])
 
 
 def _pupil_distance(scan, landmarks):
