@@ -6,7 +6,7 @@ made it poke through the lids). Then the margins, which no scanner sees well, ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from facewright.mesh.spread import spread_smoothly
 
 EYE_RADIUS_MM = 12.0
 RADIUS_LIMITS_MM = (11.0, 13.0)
+_LEAST_BULGE = 0.02  # of the radius: an eye that bulges less than this has no cornea
 _CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
 
 
@@ -35,21 +36,20 @@ class LidOptions:
 
 @dataclass(frozen=True)
 class Eyeball:
-    """A ball with a cornea. center (3,) mm, radius of the sclera, profile: its radius by the angle from the axis +Z.
+    """A ball with a cornea. center (3,) mm, radius of the sclera, axis (3,) unit through the pupil.
 
-    angles (a,) radians from the axis, radii (a,) mm
+    angles (a,) radians from the axis and radii (a,) mm there: the profile, round about the axis
     """
 
     center: np.ndarray
     radius: float
+    axis: np.ndarray
     angles: np.ndarray
     radii: np.ndarray
 
     def surface_radius(self, points):
         """(k,) distance of the eye's surface from its centre in the direction of points (k, 3)."""
-        offset = points - self.center
-        angle = np.arctan2(np.hypot(offset[:, 0], offset[:, 1]), offset[:, 2])
-        return np.interp(angle, self.angles, self.radii)
+        return np.interp(angle_from(self.axis, points - self.center), self.angles, self.radii)
 
     def gap(self, points):
         """(k,) mm from the surface to points, negative inside."""
@@ -62,23 +62,40 @@ class Eyeball:
         return self.center + offset * ((self.surface_radius(points) + gap) / length)[:, None]
 
 
-def measure_eyeball(vertices, center):
-    """The Eyeball of an eye part's vertices (k, 3) that turns about center (3,).
+def angle_from(axis, directions):
+    """(k,) radians between a unit axis (3,) and directions (k, 3)."""
+    along = directions @ axis
+    across = np.linalg.norm(directions - along[:, None] * axis, axis=1)
+    return np.arctan2(across, along)
 
-    The radius is that of the back half, where no cornea is; the profile takes the outermost vertex of each 3 degrees.
+
+def eye_parts(template, side):
+    """The parts that turn with an eye: the ball itself, and iris and cornea where they are separate."""
+    return [part for part in template.parts if part.attach == f"eye_{side}"]
+
+
+def measure_eyeball(template, side):
+    """The Eyeball of a template.
+
+    The radius is that of the ball's back half, where no cornea is. The axis goes through the middle of what bulges out
+    most, which is the cornea. The profile takes the outermost vertex of any of the eye's parts in each 3 degrees.
     """
-    offset = vertices - center
+    center = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
+    ball = template.vertices[template.part(f"eye_{side}").vertex_slice] - center
+    radius = float(np.median(np.linalg.norm(ball[ball[:, 2] < 0], axis=1)))
+    offset = np.concatenate([template.vertices[part.vertex_slice] for part in eye_parts(template, side)]) - center
     distance = np.linalg.norm(offset, axis=1)
-    angle = np.arctan2(np.hypot(offset[:, 0], offset[:, 1]), offset[:, 2])
-    back = offset[:, 2] < 0
-    radius = float(np.median(distance[back] if back.any() else distance))
+    bulge = np.maximum(distance - radius, 0.0) * (offset[:, 2] > 0)
+    axis = (bulge**2) @ (offset / distance[:, None])
+    axis = axis / np.linalg.norm(axis) if bulge.max() > _LEAST_BULGE * radius else np.array([0.0, 0.0, 1.0])
+    angle = angle_from(axis, offset)
     edges = np.radians(np.arange(0, 181, 3))
     bins = np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2)
     outermost = np.zeros(len(edges) - 1)
     np.maximum.at(outermost, bins, distance)
     seen = outermost > 0
     middles = 0.5 * (edges[:-1] + edges[1:])
-    return Eyeball(np.asarray(center, float), radius, middles[seen], np.maximum(outermost[seen], radius))
+    return Eyeball(center, radius, axis, middles[seen], np.maximum(outermost[seen], radius))
 
 
 def eye_radius(template, vertices, lines):
@@ -98,18 +115,24 @@ def place_eyeball(template, vertices, lines, side, radius, options=None):
     the margins, corners apart, options.gap_mm. vertices (n, 3) of the person, lines as in Face, radius mm
     """
     options = options or LidOptions()
-    own = measure_eyeball(template.vertices[template.part(f"eye_{side}").vertex_slice], _joint(template, side))
+    own = measure_eyeball(template, side)
     scale = radius / own.radius
     there, _ = _margin(template.vertices, template.lines, side)
     margin, inner = _margin(vertices, lines, side)
     center = margin.mean(axis=0) + scale * (own.center - there.mean(axis=0))
-    ball = Eyeball(center, radius, own.angles, own.radii * scale)
+    ball = replace(own, center=center, radius=radius, radii=own.radii * scale)
     depth = _depths(ball, margin[inner], options.gap_mm)
-    return Eyeball(center + [0.0, 0.0, np.median(depth)], radius, ball.angles, ball.radii)
+    return replace(ball, center=center + [0.0, 0.0, np.median(depth)])
 
 
-def _joint(template, side):
-    return template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
+def moved_to(template, side, ball):
+    """part name -> vertices (k, 3) of an eye's parts, brought to a ball by shift and scale: it looks straight ahead."""
+    own = measure_eyeball(template, side)
+    scale = ball.radius / own.radius
+    return {
+        part.name: ball.center + (template.vertices[part.vertex_slice] - own.center) * scale
+        for part in eye_parts(template, side)
+    }
 
 
 def _margin(vertices, lines, side):
@@ -161,7 +184,7 @@ def fit_lids(template, vertices, regions, lines, side, ball, options=None):
         index = np.array(sorted(wanted))
         values = np.array([wanted[i] for i in index]) - V[index]
         moved = V + spread_smoothly(rest, faces, index, values, free, options.reach_mm)
-        inside = free & ~held & (ball.gap(moved) < 0.5 * clearance)
+        inside = outer & ~held & (ball.gap(moved) < 0.5 * clearance)
         inside[index] = False
         if not inside.any():
             break

@@ -11,11 +11,12 @@ from scipy.spatial import cKDTree
 from facewright.data import Skeleton
 from facewright.mesh.closest import Surface
 from facewright.mesh.raster import RayScene
-from facewright.parts.eyes import LidOptions, eye_radius, fit_lids, measure_eyeball, place_eyeball
+from facewright.parts.eyes import LidOptions, eye_radius, fit_lids, moved_to, place_eyeball
 from facewright.solve.procrustes import best_similarity
 
 _MOUTH_REACH_MM = 18.0  # skin this near to the teeth says where they belong
 _JOINT_REACH_MM = 35.0
+_FRONT_TEETH_MM = 10.0  # from the foremost tooth backwards: incisors and canines
 _NEIGHBOURS = 12
 
 
@@ -49,7 +50,8 @@ def fit_parts(face, options=None):
     for side in ("left", "right"):
         ball = place_eyeball(template, V, face.lines, side, radius, options.lids)
         V, lids = fit_lids(template, V, face.regions, face.lines, side, ball, options.lids)
-        V[template.part(f"eye_{side}").vertex_slice] = _eye_vertices(template, side, ball)
+        for name, placed in moved_to(template, side, ball).items():
+            V[template.part(name).vertex_slice] = placed
         stats[f"eye_{side}"] = {"radius_mm": ball.radius, "center_mm": ball.center.tolist(), **lids}
     mouth = [part for part in template.parts if part.attach in ("skull", "jaw")]
     if mouth:
@@ -80,14 +82,6 @@ def fit_skeleton(template, vertices):
     return Skeleton(template.skeleton.names, template.skeleton.parents, np.array(positions))
 
 
-def _eye_vertices(template, side, ball):
-    """The template's eye, brought to a ball without turning it."""
-    part = template.part(f"eye_{side}").vertex_slice
-    joint = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
-    own = measure_eyeball(template.vertices[part], joint)
-    return ball.center + (template.vertices[part] - own.center) * (ball.radius / own.radius)
-
-
 def _fit_mouth(template, vertices, parts, options):
     """Teeth, gums and tongue by one similarity of the skin around them, so that the bite stays as it is.
 
@@ -100,11 +94,12 @@ def _fit_mouth(template, vertices, parts, options):
     weights = np.exp(-0.5 * (distance / _MOUTH_REACH_MM) ** 2)
     R, scale, t = best_similarity(template.vertices[skin], vertices[skin], weights, options.mouth_scale)
     placed = scale * rest @ R.T + t
-    allowed = _misplaced(template.vertices, template, rest) + [options.poke_mm, options.show_share]
+    front = _front_teeth(template, parts)
+    allowed = _misplaced(template.vertices, template, rest[front]) + [options.poke_mm, options.show_share]
     steps = np.arange(0.0, options.most_back_mm + 1e-9, 0.5)
     tried = []
     for back in steps:
-        tried.append(_misplaced(vertices, template, placed - [0.0, 0.0, back]))
+        tried.append(_misplaced(vertices, template, placed[front] - [0.0, 0.0, back]))
         if (tried[-1] <= allowed).all():
             break
     best = int(np.argmin([np.maximum(found - allowed, 0.0) @ [1.0, 20.0] for found in tried]))
@@ -112,6 +107,15 @@ def _fit_mouth(template, vertices, parts, options):
     result[index] = placed - [0.0, 0.0, steps[best]]
     stats = {"scale": scale, "moved_back_mm": float(steps[best])}
     return result, stats | {"deepest_in_skin_mm": float(tried[best][0]), "seen_from_front_share": float(tried[best][1])}
+
+
+def _front_teeth(template, parts):
+    """(k,) bool over the vertices of parts: the teeth behind the lips; all of them where no part is named teeth."""
+    depth = np.concatenate([template.vertices[part.vertex_slice, 2] for part in parts])
+    teeth = np.concatenate([np.full(np.diff(part.vertices), part.name.startswith("teeth")) for part in parts])
+    if not teeth.any():
+        teeth[:] = True
+    return teeth & (depth > depth[teeth].max() - _FRONT_TEETH_MM)
 
 
 def _misplaced(vertices, template, points):

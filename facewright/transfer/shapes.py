@@ -28,7 +28,7 @@ class TransferOptions:
     """
 
     w_lids: float = 5.0
-    w_lips: float = 0.3
+    w_lips: float = 1.0
 
 
 def transfer_shapes(face, options=None):
@@ -46,7 +46,7 @@ def transfer_shapes(face, options=None):
     links = feature_links(face.lines, template.vertices, options)
     skin = DeformationTransfer(template.vertices[:stop], V[:stop], faces, fixed=fixed, links=links)
     result = np.zeros(template.deltas.shape)
-    result[:, :stop] = _with_bases(skin, template, stop)
+    result[:, :stop] = _with_bases(skin, template.deltas[:, :stop], template.shape_names)
     _carry_bones(template, V, skin.rotation, result)
     _carry_the_rest(template, V, skin.rotation, result)
     return result
@@ -81,15 +81,18 @@ def _along(chain):
     return steps / max(steps[-1], 1e-12)
 
 
-def _with_bases(transfer, template, stop):
-    """(s, n_skin, 3): shapes from the neutral, correctives from the shape they are made on."""
-    deltas = template.deltas[:, :stop]
-    names = template.shape_names
+def _with_bases(transfer, deltas, names):
+    """(s, n_skin, 3): shapes from the neutral, correctives from the shape they are made on.
+
+    What is held should not move under any shape; where a template's does a little, it does so here.
+    """
+    held = np.where(transfer.fixed[:, None], deltas @ transfer.rotation.T, 0.0)
     plain = [i for i, name in enumerate(names) if CORRECTIVE_BASE.get(name) not in names]
     result = np.zeros(deltas.shape)
-    result[plain] = transfer.transfer(deltas[plain])
+    result[plain] = transfer.transfer(deltas[plain], held=held[plain])
     for i in sorted(set(range(len(names))) - set(plain)):
-        result[i] = transfer.transfer(deltas[i : i + 1], base=deltas[names.index(CORRECTIVE_BASE[names[i]])])[0]
+        base = deltas[names.index(CORRECTIVE_BASE[names[i]])]
+        result[i] = transfer.transfer(deltas[i : i + 1], base=base, held=held[i : i + 1])[0]
     return result
 
 

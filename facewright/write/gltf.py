@@ -290,7 +290,9 @@ class _Document:
                 for p, q in zip(primitive.target_positions, primitive.target_normals)
             ]
             mesh |= {"weights": [0.0] * len(target_names), "extras": {"targetNames": list(target_names)}}
-        node = {"name": name, "mesh": self._append("meshes", mesh), "skin": skin}
+        taken = {node["name"] for node in self._json["nodes"]}
+        node_name = f"{name}_mesh" if name in taken else name  # a joint "eye_left" has its name first
+        node = {"name": node_name, "mesh": self._append("meshes", mesh), "skin": skin}
         self._json["scenes"][0]["nodes"].append(self._append("nodes", node))
 
     def to_bytes(self):

@@ -16,10 +16,10 @@ scene.add(key, rim);
 const camera = new THREE.PerspectiveCamera(24, innerWidth / innerHeight, 0.01, 10);
 
 const cameras = {
-  front: [[0, -0.02, 0.95], [0, -0.02, 0]],
-  side: [[0.85, -0.02, 0.35], [0, -0.02, 0]],
-  eyes: [[0, 0, 0.36], [0, 0, 0]],
-  mouth: [[0.03, -0.06, 0.34], [0, -0.07, 0]],
+  front: [[0, -0.03, 0.75], [0, -0.03, 0]],
+  side: [[0.7, -0.03, 0.25], [0, -0.03, -0.05]],
+  eyes: [[0, 0, 0.25], [0, 0, 0]],
+  mouth: [[0.03, -0.06, 0.26], [0, -0.07, 0]],
 };
 
 const gltf = await new GLTFLoader().loadAsync('/rig.glb');

@@ -1,0 +1,144 @@
+"""A Rig from a face, its shapes and its maps: everything a writer needs, nothing a writer decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from facewright.data import Material, Mesh, Rig
+from facewright.parts.eyes import measure_eyeball
+from facewright.parts.fit import fit_skeleton
+from facewright.parts.iris import EyeLook, paint_eye
+
+_STILL_MM = 1e-6
+SKIN_MAPS = ("albedo", "normal")
+
+
+@dataclass(frozen=True)
+class AssemblyOptions:
+    """eyes      how eyes are painted; None leaves them plain
+    left_out  parts that the rig shall not have, by the beginning of their names. Lash cards and the veils around the
+              eye have no textures of their own and are made for one size of ball: worse than nothing
+    """
+
+    eyes: EyeLook | None = field(default_factory=EyeLook)
+    left_out: tuple[str, ...] = ("lashes", "occlusion", "blend", "lacrimal")
+
+
+def build_rig(face, deltas, maps=None, options=None):
+    """The Rig of a Face whose parts are in place (fit_parts) with its shapes (transfer_shapes).
+
+    deltas  (s, n, 3) mm from face.vertices, in the order of face.template.shape_names
+    maps    name -> (h, w, c) uint8 of the skin; "albedo" and "normal" go on its material, others are left to textures/
+    returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
+    """
+    options = options or AssemblyOptions()
+    maps = maps or {}
+    template = face.template
+    used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
+    meshes = []
+    for part in template.parts:
+        if part.name.startswith(options.left_out):
+            continue
+        material, painted = _material(template, part, used, options)
+        used.update(painted)
+        meshes.append(_mesh(face, deltas, part, material))
+    n_skin = template.skin.vertices[1]
+    return Rig(
+        meshes=tuple(meshes),
+        target_names=template.shape_names,
+        skeleton=fit_skeleton(template, face.vertices),
+        maps=used,
+        regions={name: mask[:n_skin] for name, mask in face.regions.items()},
+        lines={name: line for name, line in face.lines.items() if (np.asarray(line) < n_skin).all()},
+        info=rig_info(template),
+    )
+
+
+def rig_info(template):
+    """What a rig says of where it comes from: template, version, topology, licence, credits (a list), copyright."""
+    info = template.info
+    credits = info.get("credits", ())
+    return {
+        "template": info.get("name"),
+        "template_version": info.get("version"),
+        "topology_id": info.get("topology_id"),
+        "licence": info.get("licence"),
+        "licence_text": info.get("licence_text"),
+        "credits": [credits] if isinstance(credits, str) else list(credits),
+        "copyright": info.get("copyright") or info.get("licence") or "",
+        "units": "millimetres",
+    }
+
+
+def _mesh(face, deltas, part, material):
+    """One part as a Mesh with indices of its own."""
+    template, at = face.template, part.vertex_slice
+    start, stop = part.vertices
+    rows = (template.polygons[:, 0] >= start) & (template.polygons[:, 0] < stop)
+    polygons, uv_polygons = template.polygons[rows], template.uv_polygons[rows]
+    uv_faces = template.uv_faces[part.face_slice]
+    corners, uv_local = np.unique(np.concatenate([uv_faces.ravel(), uv_polygons.ravel()]), return_inverse=True)
+    shift = int(corners[0] < 0)  # the padding -1 sorts first
+    uv_local = uv_local.reshape(-1) - shift
+    own = deltas[:, at]
+    moves = np.abs(own).max(initial=0.0) > _STILL_MM
+    return Mesh(
+        name=part.name,
+        vertices=face.vertices[at],
+        faces=template.faces[part.face_slice] - start,
+        polygons=np.where(polygons >= 0, polygons - start, -1),
+        uv=template.uv[corners[shift:]],
+        uv_faces=uv_local[: uv_faces.size].reshape(-1, 3),
+        uv_polygons=uv_local[uv_faces.size :].reshape(-1, 4),
+        material=material,
+        skin_weights=_weights(template, part),
+        deltas=own if moves else None,
+    )
+
+
+def _weights(template, part):
+    """(p, j) skin weights; what turns with a bone hangs on that bone alone."""
+    bone = {"skull": "head"}.get(part.attach, part.attach)
+    if bone == "skin" or bone not in template.skeleton.names:
+        return template.skin_weights[part.vertex_slice]
+    weights = np.zeros((part.vertices[1] - part.vertices[0], len(template.skeleton.names)))
+    weights[:, template.skeleton.names.index(bone)] = 1.0
+    return weights
+
+
+def _material(template, part, maps, options):
+    """The Material of a part and the maps painted for it."""
+    look = template.materials[part.material]
+    plain = {
+        "color": tuple(float(c) for c in look.get("color", (0.8, 0.8, 0.8))),
+        "roughness": float(look.get("roughness", 0.6)),
+        "alpha": float(look.get("alpha", 1.0)),
+        "double_sided": bool(look.get("double_sided", False)),
+    }
+    if part is template.skin or part.name == "skin":
+        found = {name: name for name in SKIN_MAPS if name in maps}
+        if "albedo" in found:
+            plain["color"] = (1.0, 1.0, 1.0)
+        return Material(part.material, **plain, albedo=found.get("albedo"), normal=found.get("normal")), {}
+    if part.attach.startswith("eye_") and options.eyes is not None and plain["alpha"] == 1.0:
+        name = f"{part.name}_albedo"
+        # Through the pupil of a separate iris its own back is seen, from within.
+        plain |= {"color": (1.0, 1.0, 1.0), "double_sided": part.name != part.attach}
+        return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
+    return Material(part.material, **plain), {}
+
+
+def _painted(template, part, look):
+    """The texture of one eye part, painted on the template's eye, which looks straight ahead as the person's does."""
+    start = part.vertices[0]
+    return paint_eye(
+        template.vertices[part.vertex_slice],
+        template.faces[part.face_slice] - start,
+        template.uv,
+        template.uv_faces[part.face_slice],
+        measure_eyeball(template, part.attach.removeprefix("eye_")),
+        look,
+        inner=part.name != part.attach,
+    )
