@@ -11,15 +11,19 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from cases import SEEDS, find_benchmark_template, fitting_template, make_case
 from common import Verdict, print_table
 from meshmonk_runner import is_available, run_meshmonk
+from PIL import Image
 
 from facewright.evaluate.distances import benchmark_scale, interpupillary_mm
 from facewright.evaluate.quality import measure_quality
 from facewright.evaluate.truth import surface_errors, vertex_errors
+from facewright.mesh.raster import Camera
+from facewright.mesh.render import render, srgb_to_linear
 from facewright.register import register
 from facewright.scan import clean_scan, find_landmarks
 from facewright.scan.landmarks import STABLE
@@ -65,7 +69,30 @@ def figures(template, fit, found, case, seconds):
     }
 
 
-def run_template(name, seeds, with_meshmonk, verdict):
+def write_picture(path, template, fit, found, case):
+    """The scan, the fit in clay and the fit coloured by its error: blue 0, white 1, red 3 mm and more."""
+    T = found.scan.T_ours_to_scan
+    error = np.linalg.norm(fit @ T[:3, :3].T + T[:3, 3] - case.truth, axis=1)
+    ramp = ([0.1, 0.8, 0.7], [0.2, 0.8, 0.1], [0.7, 0.8, 0.1])
+    heat = np.stack([np.interp(error, [0, 1, 3], levels) for levels in ramp], axis=1)
+    skin = template.faces[template.skin.face_slice]
+    rows = []
+    for yaw in (0.0, 50.0):
+        camera = Camera.looking_at((0.0, -25.0, 0.0), yaw, 0.0, 120.0, (560, 480))
+        looks = srgb_to_linear(found.scan.colors) if found.scan.colors is not None else None
+        rows.append(
+            np.hstack(
+                [
+                    render(found.scan.vertices, found.scan.faces, camera, colors=looks),
+                    render(fit, template.faces, camera),
+                    render(fit, skin, camera, colors=heat),
+                ]
+            )
+        )
+    Image.fromarray(np.vstack(rows)).save(path)
+
+
+def run_template(name, seeds, with_meshmonk, verdict, pictures=None):
     """Print both tables of a template and add to the verdict."""
     template = find_benchmark_template(name)
     if template is None:
@@ -81,6 +108,8 @@ def run_template(name, seeds, with_meshmonk, verdict):
         face = register(found.scan, found.landmarks, fitted_with)
         row = figures(template, face.fit, found, case, time.perf_counter() - began)
         ours.append(row)
+        if pictures:
+            write_picture(pictures / f"{case.name}.png", template, face.fit, found, case)
         for figure, bar in BARS.items():
             verdict.check(case.name, figure, row[figure], bar)
         if with_meshmonk:
@@ -104,13 +133,16 @@ def main():
     parser.add_argument("--templates", nargs="+", default=["hm08", "ict"])
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS))
     parser.add_argument("--no-meshmonk", action="store_true")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write a picture of each fit there")
     options = parser.parse_args()
+    if options.pictures:
+        options.pictures.mkdir(parents=True, exist_ok=True)
     with_meshmonk = not options.no_meshmonk and is_available()
     if not with_meshmonk:
         print("MeshMonk is left out (pip install meshmonk==0.3.0 to compare)")
     verdict = Verdict()
     for name in options.templates:
-        run_template(name, options.seeds, with_meshmonk, verdict)
+        run_template(name, options.seeds, with_meshmonk, verdict, options.pictures)
     verdict.print()
 
 
