@@ -15,6 +15,7 @@ from facewright.mesh.polygons import triangulated
 from facewright.template import rules
 from facewright.template.assemble import assemble, fit_sphere
 from facewright.template.lines import feature_lines, find_loops
+from facewright.template.lips import closed_lips, paired_modes
 from facewright.template.regions import Head, skin_openness, skin_regions, still_region
 from facewright.template.skeleton import head_skeleton
 from facewright.template.source import read_description, read_source_mesh, read_source_vertices
@@ -167,27 +168,19 @@ def _source_stops(description, shaped):
 
 
 def _closed_lips(description, shaped, vertices, identity, head, lines):
-    """Neutral and identity modes whose paired lip points coincide, each lip moved half the way."""
+    """Neutral and identity modes whose paired lip points meet, each lip moved half the way."""
     options = description.get("rules", {}).get("close_lips")
     if not options:
         return vertices, identity
-    upper, lower = lines["lip_seam_upper"][1:-1], lines["lip_seam_lower"][1:-1]
+    upper, lower = lines["lip_seam_upper"], lines["lip_seam_lower"]
     skin = shaped.parts[0].vertex_slice
-    spread = rules.Spread(head.vertices, head.faces, np.concatenate([upper, lower]), float(options["radius_mm"]))
+    radius = float(options["radius_mm"])
     closed, modes = vertices.copy(), identity.copy()
-    half = 0.5 * (vertices[lower] - vertices[upper])
-    closed[skin] += spread(np.concatenate([half, -half]))
+    closed[skin] = symmetrized(closed_lips(head.vertices, head.faces, upper, lower, radius_mm=radius), head.mirror)
+    keep = paired_modes(head.vertices, head.faces, upper, lower, radius_mm=radius)
     for mode in modes:
-        half = 0.5 * (mode[lower] - mode[upper])
-        mode[skin] += spread(np.concatenate([half, -half]))
-    return symmetrized_skin(closed, head, skin), modes
-
-
-def symmetrized_skin(vertices, head, skin):
-    """vertices with the skin made exactly symmetric again."""
-    result = vertices.copy()
-    result[skin] = symmetrized(vertices[skin], head.mirror)
-    return result
+        mode[skin] += keep(mode[skin])
+    return closed, modes
 
 
 def _shape_rules(description, shaped, vertices, names, deltas, head):

@@ -11,9 +11,11 @@ import numpy as np
 
 from facewright.errors import StageError
 from facewright.mesh.adjacency import border_loops
+from facewright.mesh.closest import Surface
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.raster import RayScene
-from facewright.template.loops import paired, separating_loop, shortest_path, split_loop
+from facewright.template.lips import lip_sides
+from facewright.template.loops import paired, separating_loop, shortest_path, split_loop, straightened
 from facewright.template.regions import Loops, enclosed, eye_pouch, mouth_bag, polygons_within, seen_from_inside
 
 
@@ -33,9 +35,7 @@ def feature_lines(head, loops, stops=None):
     x, twin = head.vertices[:, 0], head.mirror
     lid, lips = loops.lid, loops.lips
     upper, lower = _upper_first(head, *split_loop(lid, lid[np.argmin(x[lid])], lid[np.argmax(x[lid])]))
-    corner = lips[np.argmax(x[lips])]
-    lip_upper, lip_lower = paired(*_upper_first(head, *split_loop(lips, twin[corner], corner)))
-    lines = {"lip_seam_upper": lip_upper, "lip_seam_lower": lip_lower}
+    lines = dict(zip(("lip_seam_upper", "lip_seam_lower"), _seam(head, lips)))
     for name in ("lip_outer_upper", "lip_outer_lower"):
         if name in stops:
             lines[name] = shortest_path(head.vertices, head.polygons, stops[name])
@@ -46,6 +46,16 @@ def feature_lines(head, loops, stops=None):
     if borders:
         lines["neck_ring"] = borders[0]
     return lines
+
+
+def _seam(head, lips):
+    """Paired upper and lower seam from the right corner to the left: paired on the left half, mirrored to the right."""
+    chains = _chains(head, lips)
+    middles = [np.flatnonzero(head.midline[chain]) for chain in chains]
+    if any(len(middle) != 1 for middle in middles):
+        return paired(head.vertices, *chains)
+    halves = paired(head.vertices, *(chain[middle[0] :] for chain, middle in zip(chains, middles)))
+    return tuple(np.concatenate([head.mirror[half[:0:-1]], half]) for half in halves)
 
 
 def _upper_first(head, first, second):
@@ -64,19 +74,44 @@ def _lid_loop(head):
 
 
 def _mouth_loop(head):
-    """Edges where the two lips are near each other are cheap, so that the line of contact wins over other rings."""
+    """Edges where the two lips are near each other are cheap, so that the line of contact wins over other rings.
+
+    At first "near" is what lies ahead of a vertex; once a loop tells the lips apart, their distance decides.
+    """
     bag = mouth_bag(head)
     opening = np.array([0.0, head.mouth[1], head.vertices[bag, 2].max() + 15 * head.scale])
     far = ~seen_from_inside(head, head.mouth, 90 * head.scale)
     far &= np.linalg.norm(head.vertices - opening, axis=1) > 50 * head.scale
-    gap = np.minimum(_gap_ahead(head), 4 * head.scale)
-    return separating_loop(
-        head.vertices,
-        head.polygons,
-        polygons_within(bag, head.polygons),
-        polygons_within(far, head.polygons),
-        edge_factor=lambda edges: 0.3 + gap[edges].mean(axis=1),
-    )
+    inside, outside = polygons_within(bag, head.polygons), polygons_within(far, head.polygons)
+    loop = _cheapest_ring(head, inside, outside, _gap_ahead(head))
+    return _cheapest_ring(head, inside, outside, _gap_between(head, _chains(head, loop)))
+
+
+def _cheapest_ring(head, inside, outside, gap):
+    """The closed ring between two sets of polygons along which gap (n,) mm is least."""
+    limited = np.minimum(gap, 4 * head.scale)
+
+    def factor(edges):
+        return 0.3 + limited[edges].mean(axis=1)
+
+    loop = separating_loop(head.vertices, head.polygons, inside, outside, edge_factor=factor)
+    return straightened(head.vertices, head.polygons, loop, edge_factor=factor)
+
+
+def _chains(head, lips):
+    """Upper and lower chain of the lip loop, from the right corner to the left."""
+    corner = lips[np.argmax(head.vertices[lips, 0])]
+    return _upper_first(head, *split_loop(lips, head.mirror[corner], corner))
+
+
+def _gap_between(head, chains):
+    """(n,) mm from each lip vertex to the other lip; inf elsewhere."""
+    sides = lip_sides(head.vertices, head.faces, *chains)
+    gap = np.full(len(head.vertices), np.inf)
+    for mine, other in (sides, sides[::-1]):
+        patch = head.faces[other[head.faces].all(axis=1)]
+        gap[mine] = Surface(head.vertices, patch).closest(head.vertices[mine]).distance
+    return gap
 
 
 def _gap_ahead(head):
@@ -104,7 +139,7 @@ def _nostril_loop(head, openness, lips):
         head.polygons,
         polygons_within(dark, head.polygons),
         polygons_within(bright & ~dark, head.polygons),
-        edge_factor=lambda edges: 0.15 + 3 * (2 * openness[edges].mean(axis=1) - 0.9) ** 2,
+        edge_factor=lambda edges: 0.4 + 3 * (2 * openness[edges].mean(axis=1) - 0.9) ** 2,
     )
 
 

@@ -61,6 +61,56 @@ def border_of(polygons, chosen):
     return np.array(max(loops, key=len))
 
 
+class _EdgeFans:
+    """Neighbours of vertices and polygons of edges, for walks along rings of quads."""
+
+    def __init__(self, polygons):
+        edges, owner = polygon_half_edges(polygons)
+        self._corners = [set(p[p >= 0].tolist()) for p in polygons]
+        self._neighbours, self._polygons = {}, {}
+        for (a, b), polygon in zip(edges.tolist(), owner.tolist()):
+            self._neighbours.setdefault(a, set()).add(b)
+            self._neighbours.setdefault(b, set()).add(a)
+            self._polygons.setdefault((min(a, b), max(a, b)), []).append(polygon)
+
+    def opposite(self, before, vertex):
+        """The neighbour of vertex straight across from before; None where the vertex has not four edges."""
+        around = self._neighbours[vertex]
+        if len(around) != 4:
+            return None
+        beside = set().union(*(self._corners[p] for p in self._polygons[min(before, vertex), max(before, vertex)]))
+        across = [v for v in around if v != before and v not in beside]
+        return across[0] if len(across) == 1 else None
+
+    def ring(self, start, following, most):
+        """The closed ring that goes straight on from an edge; None if it ends or takes more than most vertices."""
+        ring = [start, following]
+        while len(ring) < most:
+            ahead = self.opposite(ring[-2], ring[-1])
+            if ahead is None or ahead == start:
+                return None if ahead is None else np.array(ring)
+            ring.append(ahead)
+        return None
+
+
+def straightened(vertices, polygons, loop, *, edge_factor):
+    """The cheapest closed straight ring that shares an edge with a loop; the loop itself where there is none.
+
+    A narrowest cut may change rings here and there for a fraction of a millimetre; a ring of the mesh moves better.
+    """
+    fans = _EdgeFans(polygons)
+    best, least = loop, np.inf
+    for start, following in zip(loop.tolist(), np.roll(loop, -1).tolist()):
+        ring = fans.ring(start, following, most=4 * len(loop))
+        if ring is None:
+            continue
+        edges = np.stack([ring, np.roll(ring, -1)], axis=1)
+        cost = float((np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1) * edge_factor(edges)).sum())
+        if cost < least:
+            best, least = ring, cost
+    return best
+
+
 def split_loop(loop, start, end):
     """Two chains of a closed loop from vertex start to vertex end, both with their ends."""
     loop = np.roll(loop, -int(np.flatnonzero(loop == start)[0]))
@@ -90,14 +140,39 @@ def shortest_path(vertices, polygons, stops, *, edge_factor=None):
     return np.array(walk)
 
 
-def paired(first, second):
-    """Two chains with shared ends, thinned to the same length by leaving out vertices next to the ends.
+def paired(vertices, first, second, *, skip_mm=0.6):
+    """Two chains (a,), (b,) of vertices with shared or facing ends, thinned so that they pair i <-> i: (k,), (k,).
 
-    A loop around a mouth often has its corner on an edge, so that one lip has a vertex more at each end; those sit
-    within a fraction of a millimetre of the corner.
+    The vertices of two lips seldom face each other one by one. The pairing keeps the order and minimises
+    sum over pairs |difference in arc length| + skip_mm per vertex left out (dynamic programming as for text).
+    Arc lengths count in the mean length of both chains.
     """
-    surplus = len(first) - len(second)
-    longer = first if surplus > 0 else second
-    head, tail = (abs(surplus) + 1) // 2, abs(surplus) // 2
-    thinned = np.concatenate([longer[:1], longer[1 + head : len(longer) - 1 - tail], longer[-1:]])
-    return (thinned, second) if surplus > 0 else (first, thinned)
+    lengths = [
+        np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices[c], axis=0), axis=1))])
+        for c in (first, second)
+    ]
+    total = 0.5 * (lengths[0][-1] + lengths[1][-1])
+    s, t = (length / length[-1] * total for length in lengths)
+    a, b = len(first), len(second)
+    cost = np.full((a, b), np.inf)
+    step = np.zeros((a, b), int)
+    cost[0, 0] = 0.0
+    for i, j in itertools.product(range(a), range(b)):
+        if i and j:
+            ways = (cost[i - 1, j - 1] + abs(s[i] - t[j]), cost[i - 1, j] + skip_mm, cost[i, j - 1] + skip_mm)
+        elif i or j:
+            ways = (np.inf, cost[i - 1, j] + skip_mm if i else np.inf, cost[i, j - 1] + skip_mm if j else np.inf)
+        else:
+            continue
+        step[i, j] = int(np.argmin(ways))
+        cost[i, j] = ways[step[i, j]]
+    pairs, i, j = [(a - 1, b - 1)], a - 1, b - 1
+    # The last vertices are a pair whatever that costs; from there back along the cheapest way.
+    i, j = i - 1, j - 1
+    while i > 0 and j > 0:
+        if step[i, j] == 0:
+            pairs.append((i, j))
+        i, j = i - (step[i, j] != 2), j - (step[i, j] != 1)
+    pairs.append((0, 0))
+    chosen = np.array(pairs[::-1])
+    return first[chosen[:, 0]], second[chosen[:, 1]]
