@@ -19,6 +19,7 @@ from facewright.bake.texels import (
     at_corners,
     at_points,
     build_texels,
+    dots,
     gather_at_vertices,
     in_chunks,
     texel_densities,
@@ -210,8 +211,14 @@ def _compose_normal(skin, texels, bends, met, weight, jobs):
 
     in_chunks(work, len(texels), jobs)
     xy = _spread(texels, result, np.ones(len(texels), bool), gutters=True)
-    z = np.sqrt(np.maximum(1.0 - (xy * xy).sum(1, keepdims=True), 0.0))
-    return _bytes(np.concatenate([xy, z], axis=1) * 127.0 + 128.0).reshape(texels.size, texels.size, 3)
+    image = np.empty((len(xy), 3), np.uint8)
+
+    def encode(piece):
+        z = np.sqrt(np.maximum(1.0 - dots(xy[piece], xy[piece]), 0.0))
+        image[piece] = _bytes(np.column_stack([xy[piece], z]) * 127.0 + 128.0)
+
+    in_chunks(encode, len(xy), jobs)
+    return image.reshape(texels.size, texels.size, 3)
 
 
 def _coverage(skin, texels, seen, weight, can_see, jobs):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.bake.texels import CHUNK
+
 
 def push_pull(values, weights, wanted=None):
     """(h, w, c) float32 without gaps, of values (h, w, c) with weights (h, w) in 0..1, 0 where a texel is empty.
@@ -12,34 +14,32 @@ def push_pull(values, weights, wanted=None):
     chart's border close to the border's own colour, which is what gutters want. wanted (h, w) bool limits which empty
     texels are filled; the others keep what they have.
     """
-    height, width = weights.shape
-    if weights.min() >= 1.0:
+    if weights.min() >= 1.0 or weights.size == 1 or not weights.any():
         return np.asarray(values, np.float32)
-    if height * width == 1 or not weights.any():
-        return np.asarray(values, np.float32)
-    values = np.asarray(values, np.float32)
+    result = np.array(values, np.float32)
     weights = np.asarray(weights, np.float32)
-    coarse, coarse_weights = _reduce(values, weights)
-    filled = push_pull(coarse, coarse_weights)
+    filled = push_pull(*_reduce(result, weights))
     empty = weights < 1.0 if wanted is None else (weights < 1.0) & wanted
-    result = values.copy()
-    rows, columns = np.nonzero(empty)
-    below = _bilinear_parent(filled, rows, columns)
-    share = weights[rows, columns, None]
-    result[rows, columns] = values[rows, columns] * share + below * (1.0 - share)
+    places = np.flatnonzero(empty)
+    for start in range(0, len(places), CHUNK):
+        rows, columns = np.divmod(places[start : start + CHUNK], weights.shape[1])
+        share = weights[rows, columns, None]
+        result[rows, columns] = result[rows, columns] * share + _bilinear_parent(filled, rows, columns) * (1.0 - share)
     return result
 
 
 def _reduce(values, weights):
     """Weighted means of 2 x 2 texels and their weights, which saturate: one filled texel fills its parent."""
-    height, width = weights.shape
-    rows, columns = -(-height // 2), -(-width // 2)
-    padded = np.zeros((2 * rows, 2 * columns, values.shape[2] + 1), np.float32)
-    padded[:height, :width, :-1] = values * weights[..., None]
-    padded[:height, :width, -1] = weights
-    sums = padded[0::2, 0::2] + padded[0::2, 1::2] + padded[1::2, 0::2] + padded[1::2, 1::2]
-    total = sums[..., -1]
-    return sums[..., :-1] / np.maximum(total, 1e-6)[..., None], np.minimum(total, 1.0)
+    height, width, channels = values.shape
+    sums = np.zeros((-(-height // 2), -(-width // 2), channels), np.float32)
+    total = np.zeros(sums.shape[:2], np.float32)
+    for row in (0, 1):
+        for column in (0, 1):
+            weight = weights[row::2, column::2]
+            here = np.s_[: weight.shape[0], : weight.shape[1]]
+            sums[here] += values[row::2, column::2] * weight[..., None]
+            total[here] += weight
+    return sums / np.maximum(total, 1e-6)[..., None], np.minimum(total, 1.0)
 
 
 def _bilinear_parent(coarse, rows, columns):

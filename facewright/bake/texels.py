@@ -10,8 +10,8 @@ import numpy as np
 from facewright.mesh.normals import face_areas
 from facewright.mesh.raster import RayScene
 
-CHUNK = 1 << 18
-"""Texels that are worked on at once: some 60 MB of intermediate arrays per thread."""
+CHUNK = 1 << 17
+"""Texels that are worked on at once: some 30 MB of intermediate arrays per thread."""
 
 
 @dataclass(frozen=True)
