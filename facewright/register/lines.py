@@ -14,7 +14,6 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 
 from facewright.mesh.raster import RayScene
 
-
 # A valley this deep is plain in clay; a line this much darker than its sides is plain in a photograph. In a shallow
 # valley the photograph decides, in a deep one the shape does.
 DEEP_MM, DARK = 0.6, 0.06
@@ -62,9 +61,7 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     R = line_frame(line, forward)
     center = line.mean(axis=0)
     local = (line - center) @ R.T
-    columns = np.arange(
-        local[0, 0] - options.overshoot_mm, local[-1, 0] + options.overshoot_mm + 1e-9, options.step_mm
-    )
+    columns = np.arange(local[0, 0] - options.overshoot_mm, local[-1, 0] + options.overshoot_mm + 1e-9, options.step_mm)
     order = np.argsort(local[:, 0])
     middle = np.interp(columns, local[order, 0], local[order, 1])
     reach = options.half_band_mm + 2 * max(options.widths_mm)
@@ -77,13 +74,25 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     rows = np.flatnonzero(inside)[path]
     along = np.arange(len(columns))
     path_strength = strength[along, rows]
-    height = gaussian_filter1d(middle + offsets[rows], 0.6 / options.step_mm, mode="nearest")
+    trust = np.clip(path_strength / DEEP_MM, 0.05, 1.0)
+    height = _smoothed(middle + offsets[rows], trust, options.step_mm)
     points_depth = gaussian_filter1d(depth[along, rows], 0.4 / options.step_mm, mode="nearest")
     start, stop = _ends(path_strength, columns, local[0, 0], local[-1, 0], options)
     points = np.stack([columns, height, points_depth], axis=1)[start:stop]
     core = path_strength[start:stop]
-    found = bool(np.median(core) > options.min_strength_mm and np.isfinite(points).all())
-    return Crease(_resample(points, 0.25) @ R + center, core, found)
+    found = bool(len(core) > 8 and np.median(core) > options.min_strength_mm and np.isfinite(points).all())
+    if not found:
+        return Crease(line, np.zeros(len(line)), False)
+    points, fractions = _resample(points, 0.25)
+    strength = np.interp(fractions, np.linspace(0, 1, len(core)), core)
+    return Crease(points @ R + center, strength, True)
+
+
+def _smoothed(height, trust, step_mm):
+    """The path's height along its columns: followed closely where the crease is deep, smoothed over where it is faint."""
+    width = 0.6 + 2.4 * (1.0 - float(np.clip(np.median(trust), 0.0, 1.0)))
+    weights = gaussian_filter1d(trust, width / step_mm, mode="nearest")
+    return gaussian_filter1d(height * trust, width / step_mm, mode="nearest") / weights
 
 
 def _depth_image(vertices, faces, R, center, columns, middle, offsets, darkness):
@@ -170,7 +179,8 @@ def _ends(strength, columns, model_start, model_end, options):
 def _resample(points, step):
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     count = max(8, round(length[-1] / step))
-    return resample_line(points, np.linspace(0, 1, count), length)
+    fractions = np.linspace(0, 1, count)
+    return resample_line(points, fractions, length), fractions
 
 
 def resample_line(points, fractions, length=None):

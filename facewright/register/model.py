@@ -20,61 +20,77 @@ from facewright.mesh.normals import vertex_normals
 class ModelOptions:
     """sigma_mm: what the identity modes cannot explain; n_effective: independent observations that the scan counts as.
 
-    expression_std: how far expression may go from rest; iterations of the surface stage
+    iterations of the surface stage; landmark_sigma_mm: how well a landmark is placed
     """
 
     sigma_mm: float = 0.7
     n_effective: float = 500.0
-    expression_std: float = 0.25
     iterations: int = 25
     landmark_sigma_mm: float = 2.0
 
 
 @dataclass(frozen=True)
 class ModelFit:
-    """vertices (n, 3); alpha (i,) identity in standard deviations; expression (e,); T (4, 4) similarity; rms mm."""
+    """vertices (n, 3) and the same at rest (n, 3); alpha (i,) identity in standard deviations; expression (e,).
+
+    T (4, 4) similarity, rms mm
+    """
 
     vertices: np.ndarray
+    rest: np.ndarray
     alpha: np.ndarray
     expression: np.ndarray
     T: np.ndarray
     rms: float
 
 
-def fit_model(mean, basis, expressions, faces, weights, target, landmark_points, landmark_rows, landmark_weights, options):
+@dataclass(frozen=True)
+class Expressions:
+    """What the face may wear: deltas (e, n, 3) at weight 1, expected (e,) weights and how far they may stray (e,)."""
+
+    deltas: np.ndarray
+    expected: np.ndarray
+    std: np.ndarray
+
+
+def fit_model(
+    mean, basis, expressions, faces, weights, target, landmark_points, landmark_rows, landmark_weights, options
+):
     """Fit the model to a scan.
 
-    mean (n, 3), basis (i, n, 3) one standard deviation each, expressions (e, n, 3) deltas at weight 1, faces (m, 3)
+    mean (n, 3), basis (i, n, 3) one standard deviation each, expressions Expressions, faces (m, 3)
     weights (n,) trust in each vertex, 0 leaves it out; target: correspond.Target
     landmark_points (l, 3) on the scan; landmark_rows: scipy sparse (l, n) that takes template vertices to landmarks
     returns ModelFit
     """
     state = _State(mean, basis, expressions)
+    deltas = expressions.deltas
     sampled = _sample_rows(mean, faces, weights)
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
     areas *= options.n_effective / areas.sum()
-    landmark_model = _project(landmark_rows, mean, basis, expressions)
+    landmark_model = _project(landmark_rows, mean, basis, deltas)
     for _ in range(8):
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
-        state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)], options)
+        state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
     for iteration in range(options.iterations):
         progress = iteration / max(1, options.iterations - 1)
         vertices = state.vertices()
         normals = vertex_normals(vertices, faces)
         reach = 25.0 * (1 - progress) + 6.0
         matches = target.match(vertices[sampled], normals[sampled], max_distance=reach, tau=max(2.0, reach / 3))
-        jacobian = state.jacobian(mean[sampled], basis[:, sampled], expressions[:, sampled])  # (k, 3, p)
+        jacobian = state.jacobian(mean[sampled], basis[:, sampled], deltas[:, sampled])  # (k, 3, p)
         rows = np.einsum("kc,kcp->kp", matches.normals, jacobian)
         residuals = np.einsum("kc,kc->k", matches.normals, vertices[sampled] - matches.points)
         surface = (rows, residuals, areas * matches.weights / options.sigma_mm**2)
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         fading = (1 - progress) ** 2 + 0.05
         landmarks = (rows, residuals, fading * row_weights / options.landmark_sigma_mm**2)
-        state.step([surface, landmarks], options)
+        state.step([surface, landmarks])
     vertices = state.vertices()
     matches = target.match(vertices[sampled], vertex_normals(vertices, faces)[sampled], max_distance=6.0)
     rms = float(np.sqrt(np.average(matches.distance**2, weights=areas * matches.weights + 1e-12)))
-    return ModelFit(vertices, state.alpha, state.expression, state.T(), rms)
+    rest = vertices - np.tensordot(state.expression, deltas, 1) @ (state.s * state.R.T)
+    return ModelFit(vertices, rest, state.alpha, state.expression, state.T(), rms)
 
 
 def _sample_rows(mean, faces, weights, count=5000):
@@ -87,9 +103,7 @@ def _project(matrix, mean, basis, expressions):
     return (
         matrix @ mean,
         np.stack([matrix @ mode for mode in basis]) if len(basis) else np.zeros((0, matrix.shape[0], 3)),
-        np.stack([matrix @ shape for shape in expressions])
-        if len(expressions)
-        else np.zeros((0, matrix.shape[0], 3)),
+        np.stack([matrix @ shape for shape in expressions]) if len(expressions) else np.zeros((0, matrix.shape[0], 3)),
     )
 
 
@@ -107,9 +121,10 @@ class _State:
     """The parameters, and the geometry and its derivative for any rows of the model."""
 
     def __init__(self, mean, basis, expressions):
-        self.mean, self.basis, self.expressions = mean, basis, expressions
+        self.mean, self.basis, self.expressions = mean, basis, expressions.deltas
+        self.expected, self.std = expressions.expected, expressions.std
         self.alpha = np.zeros(len(basis))
-        self.expression = np.zeros(len(expressions))
+        self.expression = expressions.expected.astype(float).copy()
         self.R, self.s, self.t = np.eye(3), 1.0, np.zeros(3)
 
     def T(self):
@@ -137,7 +152,7 @@ class _State:
         eye = np.broadcast_to(np.eye(3), (k, 3, 3))
         return np.concatenate([linear.transpose(1, 2, 0), cross, arm[:, :, None], eye], axis=2)
 
-    def step(self, terms, options):
+    def step(self, terms):
         """One Gauss-Newton step on weighted rows, with the priors."""
         n_identity, n_expression = len(self.alpha), len(self.expression)
         p = n_identity + n_expression + 7
@@ -146,10 +161,8 @@ class _State:
             weighted = rows * weights[:, None]
             A += weighted.T @ rows
             b -= weighted.T @ residuals
-        prior = np.concatenate(
-            [np.ones(n_identity), np.full(n_expression, options.expression_std**-2), np.full(7, 1e-6)]
-        )
-        value = np.concatenate([self.alpha, self.expression, np.zeros(7)])
+        prior = np.concatenate([np.ones(n_identity), self.std**-2, np.full(7, 1e-6)])
+        value = np.concatenate([self.alpha, self.expression - self.expected, np.zeros(7)])
         A[np.diag_indices(p)] += prior
         b -= prior * value
         step = np.linalg.solve(A, b)

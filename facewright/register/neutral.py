@@ -1,31 +1,45 @@
-"""From the fit to the neutral: the expression that the scan wears is taken out by deformation transfer."""
+"""From the fit to the neutral: the expression that the scan wears is taken out."""
 
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
-from facewright.transfer.deformation import deformation_transfer
+from facewright.mesh.adjacency import dilate
+from facewright.register.nonrigid import ElasticSkin, Rows
 
 # Less than this of a shape is taken for the person's own rest face.
-REMOVE_FROM = 0.15
+REMOVE_FROM = 0.25
+# A vertex that moves less than this (mm) under the removed shapes keeps what the scan says of it; beyond, the model at
+# rest gives its place and only the smooth part of the person's own shape is carried on.
+KEEP_MM = 0.8
 
 
-def take_out_expression(template, fit, expression):
-    """The neutral (n, 3) of a fit (n, 3) that wears expression {shape: weight}, and what was removed.
+def take_out_expression(template, model, fit_skin, expression):
+    """Skin (n, 3) at rest, and what was removed.
 
-    Transfers the way back, from the template wearing the same expression to the template at rest, onto the fit. Shapes
-    under REMOVE_FROM stay: what a model calls a tenth of a smile is more likely a face.
+    template data.Template; model ModelFit; fit_skin (n, 3) the fitted skin; expression dict shape -> weight found.
+    Shapes under REMOVE_FROM stay: what a model calls a tenth of a smile is more likely a face. Lids move only within
+    12 mm of their margins, whatever the template's blink does to the rest of the face. Deformation transfer of the way
+    back was tried first: it tears where closed lids have triangles without area.
     """
     removed = {name: weight for name, weight in expression.items() if weight >= REMOVE_FROM}
     if not removed:
-        return fit, removed
-    way = sum(weight * template.shape(name) for name, weight in removed.items())
-    still = np.linalg.norm(way, axis=1) < 0.02
-    moving = ~still
-    fixed = still & template.regions["skin"]
-    delta = deformation_transfer(template.vertices + way, fit, template.faces, -way[None], fixed=fixed | _far(moving))[0]
-    return fit + delta, removed
-
-
-def _far(moving):
-    return ~moving
+        return fit_skin, removed
+    n = len(fit_skin)
+    faces = template.faces[template.skin.face_slice]
+    linear = np.asarray(model.T)[:3, :3]
+    way = sum(weight * template.shape(name)[:n] for name, weight in removed.items()) @ linear.T
+    if all(name.startswith("eyeBlink") for name in removed):
+        near = np.zeros(n, bool)
+        for name in ("eyes", "socket_left", "socket_right"):
+            near |= template.regions[name][:n]
+        way = np.where(near[:, None], way, 0.0)
+    rest = model.rest[:n]
+    moved = np.linalg.norm(way, axis=1)
+    inside = ~dilate(template.regions["outer"][:n], faces, 1)
+    # Insides follow the model at rest, never the closed pose.
+    weights = np.where(inside, 0.0, np.exp(-((moved / KEEP_MM) ** 2)))
+    skin = ElasticSkin(rest, faces)
+    rows = Rows(sp.identity(n, format="csr"), fit_skin - way, 1e3 * weights * skin.mass)
+    return rest + skin.solve((rows,), 1.0, 0.2, 1e-4, tolerance=1e-6, max_iterations=10), removed

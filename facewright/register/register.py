@@ -9,22 +9,38 @@ import scipy.sparse as sp
 
 from facewright.data import Face
 from facewright.mesh.normals import vertex_normals
+from facewright.mesh.openness import vertex_openness
 from facewright.mesh.render import sample_texture
 from facewright.register.correspond import Target
-from facewright.register.lines import CreaseOptions, trace_crease
-from facewright.register.model import ModelOptions, fit_model
+from facewright.register.interior import tuck_interior
+from facewright.register.lines import DEEP_MM, CreaseOptions, arc_fractions, trace_crease
+from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
+from facewright.register.nonrigid import Rows
 from facewright.register.skin import contact_rows, fit_skin, line_rows, skin_rules
 from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, LIPS_INNER, LIPS_OUTER, NOSE
-from facewright.mesh.openness import vertex_openness
 
-REST_SHAPES = (
-    "mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthPressLeft mouthPressRight "
-    "browInnerUp browDownLeft browDownRight"
-).split()
+REST_SHAPES = [
+    "mouthSmileLeft",
+    "mouthSmileRight",
+    "mouthFrownLeft",
+    "mouthFrownRight",
+    "mouthPressLeft",
+    "mouthPressRight",
+    "browInnerUp",
+    "browDownLeft",
+    "browDownRight",
+]
 SIDES = {"left": "Left", "right": "Right"}
-USER_WEIGHT = 1.0
-"""A landmark with more weight than this was placed by a person and is obeyed."""
+# How far a neutral face's shapes stray from rest, and shut lids from the template's blink.
+REST_STD, SHUT_STD = 0.12, 0.15
+LID_LANDMARKS = {
+    "left": (362, 382, 381, 380, 374, 373, 390, 249, 263),
+    "right": (133, 155, 154, 153, 145, 144, 163, 7, 33),
+}
+LINE_WEIGHT = 4.0
+PLACED_WEIGHT = 25.0
+"""How much more than a found landmark one counts that a person placed."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +57,18 @@ LEVELS = tuple((w, w / 5, 3.0, 10.0) for w in (100.0, 45.0, 20.0, 10.0, 5.0))
 DETAIL = ((1.0, 0.2, 1.5, 4.0), (0.2, 0.05, 1.0, 3.0))
 
 
-def register(scan, landmarks, template, options=None):
+def register(scan, landmarks, template, options=None, placed=()):
     """Fit a template to a scan.
 
     scan       data.Scan, cleaned, in our frame (mm)
-    landmarks  data.Landmarks on the scan, MediaPipe names; weights over 1 mark points that a person placed
+    landmarks  data.Landmarks on the scan, MediaPipe names
     template   data.Template
+    placed     names of landmarks that a person placed: they are obeyed to the end
     returns    data.Face: fit (as the scan is), vertices (neutral), regions, lines, observed, statistics
     """
     options = options or RegisterOptions()
     target = Target(scan.vertices, scan.faces, vertex_openness(scan.vertices, scan.faces))
-    pairs = _landmark_pairs(scan, landmarks, template)
+    pairs = _landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
     model, names = _fit_model(template, target, pairs, closed, options.model)
     lines, leading, line_stats = _leading_lines(scan, template, model, pairs, closed)
@@ -59,12 +76,16 @@ def register(scan, landmarks, template, options=None):
     faces = template.faces[template.skin.face_slice]
     rules = skin_rules(template)
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
+    interior, outer = _interior(template)
     fit = model.vertices.copy()
-    fit[:stop] = skin
+    fit[:stop] = tuck_interior(skin, faces, interior, outer)
     expression = dict(zip(names, np.round(model.expression, 4).tolist()))
     neutral, removed = fit, {}
     if options.eyes == "template":
-        neutral, removed = take_out_expression(template, fit, expression)
+        rest, removed = take_out_expression(template, model, fit[:stop], expression)
+        if removed:
+            neutral = model.rest.copy()
+            neutral[:stop] = tuck_interior(rest, faces, interior, outer)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
@@ -91,16 +112,20 @@ def register(scan, landmarks, template, options=None):
 
 @dataclass(frozen=True)
 class _Pairs:
-    """Landmarks that scan and template share: names (l,), points (l, 3) on the scan, rows (l, n), weights (l,)."""
+    """Landmarks that scan and template share: names (l,), points (l, 3) on the scan, rows (l, n), weights (l,).
+
+    rest (l, 3) the same points on the template's neutral; by_hand (l,) bool: placed by a person
+    """
 
     names: tuple[str, ...]
     points: np.ndarray
     rows: sp.csr_matrix
     weights: np.ndarray
     rest: np.ndarray
+    by_hand: np.ndarray
 
 
-def _landmark_pairs(scan, landmarks, template):
+def _landmark_pairs(scan, landmarks, template, placed):
     on_template = {name: i for i, name in enumerate(template.landmarks.names)}
     led = {f"mp{i}" for i in LIPS_OUTER + LIPS_INNER + EYE_LEFT + EYE_RIGHT + NOSE}
     keep = [
@@ -108,7 +133,7 @@ def _landmark_pairs(scan, landmarks, template):
         for i, name in enumerate(landmarks.names)
         if name in on_template
         and landmarks.weights[i] > 0
-        and (name in led or landmarks.weights[i] > USER_WEIGHT)
+        and (name in led or name in placed)
         and template.landmarks.weights[on_template[name]] > 0
     ]
     on_scan, rows_of = np.array(keep, np.int64).reshape(-1, 2).T
@@ -121,7 +146,9 @@ def _landmark_pairs(scan, landmarks, template):
         shape=(k, len(template.vertices)),
     )
     names = tuple(landmarks.names[i] for i in on_scan)
-    return _Pairs(names, points, rows, landmarks.weights[on_scan], rows @ template.vertices)
+    by_hand = np.array([name in placed for name in names], bool)
+    weights = np.where(by_hand, PLACED_WEIGHT, landmarks.weights[on_scan])
+    return _Pairs(names, points, rows, weights, rows @ template.vertices, by_hand)
 
 
 def eyes_closed(pairs):
@@ -145,16 +172,22 @@ def eyes_closed(pairs):
     return result
 
 
+def _expressions(template, closed):
+    """What the scan may wear: lids shut where they were found shut, and a little of each rest shape."""
+    lids = [f"eyeBlink{SIDES[side]}" for side in SIDES if closed[side]]
+    names = [*REST_SHAPES, *lids]
+    deltas = np.stack([template.shape(name) for name in names])
+    rest, shut = len(REST_SHAPES), len(lids)
+    expected = np.concatenate([np.zeros(rest), np.full(shut, 0.9)])
+    return names, Expressions(deltas, expected, np.concatenate([np.full(rest, REST_STD), np.full(shut, SHUT_STD)]))
+
+
 def _fit_model(template, target, pairs, closed, options):
-    names = list(REST_SHAPES) + [f"eyeBlink{SIDES[side]}" for side in SIDES if closed[side]]
-    expressions = np.stack([template.shape(name) for name in names])
+    names, expressions = _expressions(template, closed)
     stop = template.skin.vertices[1]
     trust = np.zeros(len(template.vertices))
     trust[:stop] = skin_rules(template).trust
     trust[~template.regions["face"]] *= 0.3
-    shut = sum(closed.values())
-    for name in names[-shut:] if shut else ():
-        pass
     model = fit_model(
         template.vertices,
         template.identity_basis,
@@ -170,6 +203,14 @@ def _fit_model(template, target, pairs, closed, options):
     return model, names
 
 
+def _interior(template):
+    """(n_skin,) bool masks: insides of mouth, sockets and nostrils, and the outer skin."""
+    stop = template.skin.vertices[1]
+    names = ("mouth_interior", "socket_left", "socket_right", "nostrils")
+    outer = template.regions["outer"][:stop]
+    return np.any([template.regions[name][:stop] for name in names], axis=0) & ~outer, outer
+
+
 def _leading_lines(scan, template, model, pairs, closed):
     """Feature lines found on the scan, the rows that lead the skin to them, and what to report."""
     stop = template.skin.vertices[1]
@@ -177,6 +218,11 @@ def _leading_lines(scan, template, model, pairs, closed):
     normals = vertex_normals(model.vertices[:stop], faces)
     darkness = texture_darkness(scan)
     found, leading, stats = {}, [], {}
+    if pairs.by_hand.any():
+        rows = Rows(
+            pairs.rows[pairs.by_hand][:, :stop], pairs.points[pairs.by_hand], np.full(pairs.by_hand.sum(), 40.0)
+        )
+        leading.append(lambda _vertices: rows)
     upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
     middle = 0.5 * (model.vertices[upper] + model.vertices[lower])
     forward = normals[template.regions["lips"][:stop]].mean(axis=0)
@@ -186,25 +232,54 @@ def _leading_lines(scan, template, model, pairs, closed):
     if crease.found:
         found["lip_seam"] = crease.points
         for line in (upper, lower):
-            leading.append(line_rows(line, crease.points, 8.0, stop))
+            leading.append(line_rows(line, crease.points, LINE_WEIGHT * crease_trust(crease), stop))
         contact = contact_rows(upper[1:-1], lower[1:-1], 30.0, stop)
         leading.append(lambda _vertices: contact)
     for side in SIDES:
         if not closed[side]:
             continue
         lid_upper, lid_lower = template.lines[f"lid_upper_{side}"], template.lines[f"lid_lower_{side}"]
-        line = model.vertices[lid_upper]
+        line = _lid_line(pairs, side, model.vertices[lid_lower])
         lid = template.regions["eyes"][:stop] & (np.sign(template.vertices[:stop, 0]) == (1 if side == "left" else -1))
         crease = trace_crease(
-            scan.vertices, scan.faces, _from_right(line), normals[lid].mean(axis=0), CreaseOptions(half_band_mm=4.0), darkness
+            scan.vertices,
+            scan.faces,
+            _from_right(line),
+            normals[lid].mean(axis=0),
+            CreaseOptions(half_band_mm=3.0, overshoot_mm=2.0, prior_sigma_mm=1.5),
+            darkness,
         )
         stats[f"lid_crease_{side}_mm"] = float(np.median(crease.strength))
         if crease.found:
-            points = crease.points if side == "left" else crease.points[::-1]
+            order = slice(None) if side == "left" else slice(None, None, -1)
+            points, trust = crease.points[order], crease_trust(crease)[order]
             found[f"lid_line_{side}"] = points
             for margin in (lid_upper, lid_lower):
-                leading.append(line_rows(margin, points, 8.0, stop))
+                leading.append(line_rows(margin, points, LINE_WEIGHT * trust, stop))
+            contact = contact_rows(*_paired(lid_upper, lid_lower, model.vertices), 10.0, stop)
+            leading.append(lambda _vertices, contact=contact: contact)
     return found, tuple(leading), stats
+
+
+def crease_trust(crease):
+    """(k,) in 0.1..1: how far each point of a crease is believed, less towards its ends, which are hard to tell."""
+    fractions = np.linspace(0, 1, len(crease.points))
+    ends = np.clip(np.minimum(fractions, 1 - fractions) / 0.08, 0.25, 1.0)
+    return ends * np.clip(crease.strength / DEEP_MM, 0.1, 1.0)
+
+
+def _lid_line(pairs, side, otherwise):
+    """(k, 3) where shut lids meet by the landmarks, inner to outer canthus; the model's line without landmarks."""
+    index = {name: i for i, name in enumerate(pairs.names)}
+    rows = [index[f"mp{i}"] for i in LID_LANDMARKS[side] if f"mp{i}" in index]
+    return pairs.points[rows] if len(rows) >= 5 else otherwise
+
+
+def _paired(upper, lower, vertices):
+    """Two margins of different counts as pairs: each inner vertex of the upper with the lower's nearest by arc."""
+    at, over = arc_fractions(vertices[upper]), arc_fractions(vertices[lower])
+    nearest = np.abs(at[1:-1, None] - over[None, :]).argmin(axis=1)
+    return upper[1:-1], lower[nearest]
 
 
 def _from_right(line):

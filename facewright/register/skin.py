@@ -2,35 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import dilate
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import vertex_normals
-from facewright.register.correspond import Matches
 from facewright.register.lines import arc_fractions, resample_line
 from facewright.register.nonrigid import ElasticSkin, Rows
 
-# How far each region may be from the model before the scan there is taken for hair, cloth or a hole, mm; how much
-# stiffer than the face it is; and how much its data counts.
+# Regions away from the features: how far inside the model the scan may lie before it is taken for a hole, how far
+# outside before it is taken for hair or cloth (mm), how much stiffer than the face they are, what their data counts.
 REGION_RULES = {
-    "scalp": (8.0, 3.0, 0.5),
-    "neck": (8.0, 3.0, 0.5),
-    "ear_left": (5.0, 8.0, 0.3),
-    "ear_right": (5.0, 8.0, 0.3),
+    "scalp": (10.0, 4.0, 3.0, 0.5),
+    "neck": (8.0, 3.0, 3.0, 0.5),
+    "ear_left": (5.0, 5.0, 8.0, 0.3),
+    "ear_right": (5.0, 5.0, 8.0, 0.3),
 }
+# Hair may begin this far from eyes, lips and nostrils; there rough surface is not believed (degrees: skin, hair).
+HAIR_FROM_MM = 32.0
+SKIN_DEG, HAIR_DEG = 12.0, 20.0
 
 
 @dataclass(frozen=True)
 class SkinRules:
-    """Per skin vertex: trust (n,) 0..1 of data, stiffness (n,), reach (n,) mm."""
+    """Per skin vertex: trust (n,) 0..1 of data, stiffness (n,), inward and outward reach (n,) mm, hairy (n,) bool."""
 
     trust: np.ndarray
     stiffness: np.ndarray
-    reach: np.ndarray
+    inward: np.ndarray
+    outward: np.ndarray
+    hairy: np.ndarray
+
+    def believe(self, rows, barycentric, height, roughness):
+        """(k,) factor in 0..1 for data at faces' corners rows (k, 3): hair, cloth and holes are not believed.
+
+        height (k,) mm of the scan above the template there, roughness (k,) degrees
+        """
+        at = lambda values: np.einsum("kc,kc->k", values[rows], barycentric)  # noqa: E731
+        smooth = np.clip((HAIR_DEG - roughness) / (HAIR_DEG - SKIN_DEG), 0.0, 1.0)
+        inside = (height <= self.outward[rows].min(axis=1)) & (height >= -self.inward[rows].min(axis=1))
+        return inside * np.where(at(self.hairy.astype(float)) > 0.5, smooth, 1.0)
 
 
 def skin_rules(template):
@@ -42,22 +57,34 @@ def skin_rules(template):
     # The rims of the openings turn inward where a scan has only a filled bump: they are led by their lines.
     for name in ("socket_left", "socket_right", "mouth_interior"):
         trust[dilate(regions[name], faces, 1)] = 0.0
-    stiffness, reach = np.ones(stop), np.full(stop, np.inf)
-    for name, (limit, factor, share) in REGION_RULES.items():
+    stiffness, inward, outward = np.ones(stop), np.full(stop, np.inf), np.full(stop, np.inf)
+    for name, (deep, high, factor, share) in REGION_RULES.items():
         mask = regions.get(name, np.zeros(stop, bool)) & ~regions["face"]
         trust[mask] *= share
         stiffness[mask] = factor
-        reach[mask] = limit
-    return SkinRules(trust, stiffness, reach)
+        inward[mask], outward[mask] = deep, high
+    vertices = template.vertices[:stop]
+    features = regions["eyes"] | regions["lips"] | regions["nostrils"]
+    away = cKDTree(vertices[features]).query(vertices)[0] > HAIR_FROM_MM
+    above = vertices[:, 1] > vertices[regions["eyes"], 1].mean()
+    hairy = regions["outer"] & away & (above | ~regions["face"])
+    outward[hairy & regions["face"]] = 5.0
+    return SkinRules(trust, stiffness, inward, outward, hairy)
 
 
-def line_rows(line, points, weight, n):
-    """Rows that draw the vertices of a line (k,) to a polyline on the scan (p, 3) by arc length."""
-    return lambda vertices: Rows(
-        sp.csr_matrix((np.ones(len(line)), (np.arange(len(line)), line)), shape=(len(line), n)),
-        resample_line(points, arc_fractions(vertices[line])),
-        np.full(len(line), weight),
-    )
+def line_rows(line, points, weights, n):
+    """Function of the current vertices: Rows that draw a line's vertices (k,) to a polyline on the scan by arc length.
+
+    points (p, 3), weights (p,) along the polyline
+    """
+    matrix = sp.csr_matrix((np.ones(len(line)), (np.arange(len(line)), line)), shape=(len(line), n))
+    along = arc_fractions(points)
+
+    def rows(vertices):
+        fractions = arc_fractions(vertices[line])
+        return Rows(matrix, resample_line(points, fractions), np.interp(fractions, along, weights))
+
+    return rows
 
 
 def contact_rows(upper, lower, weight, n):
@@ -77,7 +104,7 @@ def fit_skin(start, faces, target, rules, leading, levels, samples=20000):
     returns vertices (n, 3) and the Matches of the last level
     """
     skin = ElasticSkin(start, faces, rules.stiffness)
-    points, point_normals = target.samples(samples)
+    points, point_normals, point_roughness = target.samples(samples)
     share = skin.mass.sum() / samples
     displacement = np.zeros_like(start)
     n = len(start)
@@ -89,7 +116,7 @@ def fit_skin(start, faces, target, rules, leading, levels, samples=20000):
         matches = _matches(target, vertices, normals, rules, reach, tau)
         rows = [
             Rows(identity, matches.points, matches.weights * skin.mass, matches.normals),
-            _pull_back(vertices, faces, normals, points, point_normals, rules, reach, tau, share),
+            _pull_back(vertices, faces, normals, (points, point_normals, point_roughness), rules, reach, tau, share),
             *(rule(vertices) for rule in leading),
         ]
         displacement = skin.solve(rows, w_bend, w_stretch, 1e-4, start=displacement)
@@ -98,19 +125,25 @@ def fit_skin(start, faces, target, rules, leading, levels, samples=20000):
 
 def _matches(target, vertices, normals, rules, reach, tau):
     found = target.match(vertices, normals, max_distance=reach, tau=tau)
-    weights = found.weights * rules.trust * (found.distance <= rules.reach)
-    return Matches(found.points, found.normals, weights, found.distance)
+    height = np.einsum("kc,kc->k", normals, found.points - vertices)
+    itself = np.repeat(np.arange(len(vertices))[:, None], 3, axis=1)
+    third = np.full((len(vertices), 3), 1 / 3)
+    weights = found.weights * rules.trust * rules.believe(itself, third, height, found.roughness)
+    return replace(found, weights=weights)
 
 
-def _pull_back(vertices, faces, normals, points, point_normals, rules, reach, tau, share):
+def _pull_back(vertices, faces, normals, samples, rules, reach, tau, share):
     """Rows from scan samples to the template, so that hollows that no vertex looks into are reached too."""
+    points, point_normals, roughness = samples
     nearest = Surface(vertices, faces).closest(points)
     corners = faces[nearest.faces]
     trust = interpolate(rules.trust, faces, nearest.faces, nearest.barycentric)
     trust = np.where(rules.trust[corners].min(axis=1) > 0, trust, 0.0)
-    limit = np.minimum(rules.reach[corners].min(axis=1), reach)
-    agree = np.einsum("kc,kc->k", interpolate(normals, faces, nearest.faces, nearest.barycentric), point_normals)
-    weights = trust * (nearest.distance <= limit) * (agree > 0.5)
+    smooth_normals = interpolate(normals, faces, nearest.faces, nearest.barycentric)
+    height = np.einsum("kc,kc->k", smooth_normals, points - nearest.points)
+    agree = np.einsum("kc,kc->k", smooth_normals, point_normals) > 0.5
+    weights = trust * agree * (nearest.distance <= reach)
+    weights *= rules.believe(corners, nearest.barycentric, height, roughness)
     weights = weights * (tau**2 / (tau**2 + nearest.distance**2)) ** 2 * share
     keep = np.flatnonzero(weights > 1e-6)
     rows = np.repeat(np.arange(len(keep)), 3)
