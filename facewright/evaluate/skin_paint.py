@@ -12,7 +12,8 @@ from facewright.evaluate.procedural import fractal_noise, smoothstep, speckles, 
 from facewright.evaluate.scanner import eyeball
 from facewright.mesh.closest import Surface, interpolate
 
-BROW_POINTS = {"right": (70, 63, 105, 66, 107), "left": (336, 296, 334, 293, 300)}
+BROW_POINTS = {"right": (70, 63, 105, 66, 107), "left": (300, 293, 334, 296, 336)}
+"""Landmarks along each brow, from its outer end to the nose."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ class HeadPaint:
         lids = ("lid_upper_left", "lid_lower_left", "lid_upper_right", "lid_lower_right")
         self.lids = cKDTree(_dense(vertices, [template.lines[name] for name in lids]))
         self.seam = cKDTree(_dense(vertices, [template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]))
-        self.brows = cKDTree(self.surface.closest(_brow_points(template, vertices)).points)
+        brows, self.brow_width = _brow_points(template, vertices)
+        self.brows = cKDTree(self.surface.closest(brows).points)
         nostrils = vertices[regions["nostrils"] & ~regions["outer"]]
         self.nostrils = cKDTree(nostrils) if len(nostrils) else None
         self.eyes = [eyeball(vertices[template.part(name).vertex_slice]) for name in ("eye_left", "eye_right")]
@@ -82,9 +84,10 @@ class HeadPaint:
         return np.clip(color, 0, 1)
 
     def _brow(self, color, points):
-        distance = self.brows.query(points)[0]
+        distance, nearest = self.brows.query(points)
         hairs = 0.5 + 0.5 * value_noise(points * [1.0, 0.35, 1.0], 0.7, self.seed + 5)
-        amount = smoothstep(distance, 5.0, 2.2) * (0.45 + 0.5 * hairs)
+        width = self.brow_width[nearest]
+        amount = smoothstep(distance / width, 1.25, 0.4) * (0.4 + 0.5 * hairs)
         return _mix(color, self.complexion.brows, amount)
 
     def eye(self, points):
@@ -131,11 +134,11 @@ def _dense(vertices, lines, step=0.4):
 
 
 def _brow_points(template, vertices):
-    """Points along both brows: the template's landmarks where it has them, else an arc above each eye."""
+    """Points (k, 3) along both brows and half their width (k,): by landmarks, or an arc above each eye without them."""
     marks = template.landmarks
     place = {name: i for i, name in enumerate(marks.names) if marks.weights[i] > 0}
     positions = marks.positions(vertices, template.faces)
-    pieces = []
+    pieces, widths = [], []
     for side, numbers in BROW_POINTS.items():
         names = [f"mp{number}" for number in numbers]
         if all(name in place for name in names):
@@ -144,8 +147,10 @@ def _brow_points(template, vertices):
             center, radius = eyeball(vertices[template.part(f"eye_{side}").vertex_slice])
             outward = 1.0 if side == "left" else -1.0
             t = np.linspace(-1, 1, 9)[:, None]
-            points = center + t * [outward * 20.0, 0, 0] + (1 - t**2) * [0, 4.0, 0] + [0, 1.6 * radius, 1.2 * radius]
+            points = center - t * [outward * 20.0, 0, 0] + (1 - t**2) * [0, 4.0, 0] + [0, 1.6 * radius, 1.2 * radius]
         steps = np.linspace(0, len(points) - 1, 60)
         low = np.minimum(steps.astype(int), len(points) - 2)
         pieces.append(points[low] + (steps - low)[:, None] * (points[low + 1] - points[low]))
-    return np.vstack(pieces)
+        outer_to_inner = np.linspace(0, 1, 60)
+        widths.append(1.2 + 2.8 * smoothstep(outer_to_inner, -0.1, 0.6) * smoothstep(outer_to_inner, 1.25, 0.85))
+    return np.vstack(pieces), np.concatenate(widths)
