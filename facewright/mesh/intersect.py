@@ -1,6 +1,6 @@
 """Triangles of a mesh that pass through each other."""
 
-import igl
+import igl.predicates
 import numpy as np
 
 

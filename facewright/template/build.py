@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from facewright.conventions import ARKIT_SHAPES
-from facewright.data import Landmarks, Template
+from facewright.data import Landmarks, Part, Template
 from facewright.errors import InputError
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.polygons import triangulated
 from facewright.template import rules
 from facewright.template.assemble import assemble, fit_sphere
+from facewright.template.landmarks import template_landmarks
 from facewright.template.lines import feature_lines, find_loops
 from facewright.template.lips import closed_lips, paired_modes
 from facewright.template.regions import Head, skin_openness, skin_regions, still_region
@@ -69,7 +69,7 @@ def build_template(source_folder, description_path):
         parts=shaped.parts,
         regions=regions,
         lines=lines,
-        landmarks=_landmarks(folder, description, shaped, faces, mirror),
+        landmarks=_landmarks(shaped, vertices, faces, mirror, regions["lip_upper"] | regions["lip_lower"]),
         shape_names=names,
         deltas=deltas,
         identity_basis=identity,
@@ -229,19 +229,33 @@ def _whole_head(regions, n):
     return {name: np.concatenate([mask, np.zeros(n - len(mask), bool)]) for name, mask in regions.items()}
 
 
-def _landmarks(folder, description, shaped, faces, mirror):
-    """68-point landmarks from a JSON list of source vertices, where the description names one."""
-    options = description.get("landmarks")
-    if not options:
-        return Landmarks((), np.empty(0), np.empty((0, 3)), np.empty(0))
-    try:
-        listed = json.loads((folder / options["file"]).read_text())[options["key"]]
-    except (OSError, KeyError, ValueError) as error:
-        raise InputError(f"template source: {options['file']} holds no list {options['key']!r}") from error
-    place = {int(source): index for index, source in reversed(list(enumerate(shaped.origin)))}
-    order = np.argsort(faces.ravel(), kind="stable")
-    first = order[np.searchsorted(faces.ravel()[order], [place[v] for v in listed])]
-    names = tuple(f"p{i + 1}" for i in range(len(listed)))
-    # The contour of the jaw (p1 to p17) is a matter of view, not of anatomy.
-    weights = np.where(np.arange(len(listed)) < 17, 0.0, 1.0)
-    return Landmarks(names, first // 3, np.eye(3)[first % 3], weights)
+def _landmarks(shaped, vertices, faces, mirror, lips):
+    """Landmarks found on pictures of the skin and the whole eyeballs, without lashes and the like in front."""
+    shown = [part for part in shaped.parts if part.name == "skin" or part.name.startswith(("eye_", "cornea_"))]
+    shown.sort(key=lambda part: (part.name != "skin", part.name.rsplit("_", 1)[-1]))
+    index = np.concatenate([np.arange(*part.vertices) for part in shown])
+    face_index = np.concatenate([np.arange(*part.faces) for part in shown])
+    renumber = np.full(len(vertices), -1)
+    renumber[index] = np.arange(len(index))
+    found = template_landmarks(
+        vertices[index],
+        renumber[faces[face_index]],
+        renumber[mirror[index]],
+        _merged(shown, index, face_index),
+        lips=lips[index],
+    )
+    return Landmarks(found.names, face_index[found.faces], found.barycentric, found.weights)
+
+
+def _merged(shown, index, face_index):
+    """The skin and one part per eye that takes in the cornea, numbered as the shown vertices and faces are."""
+    parts = []
+    for side in ("skin", "left", "right"):
+        mine = [part for part in shown if part.name.rsplit("_", 1)[-1] == side]
+        starts = [int(np.flatnonzero(index == part.vertices[0])[0]) for part in mine]
+        sizes = [part.vertices[1] - part.vertices[0] for part in mine]
+        first = [int(np.flatnonzero(face_index == part.faces[0])[0]) for part in mine]
+        counts = [part.faces[1] - part.faces[0] for part in mine]
+        name = side if side == "skin" else f"eye_{side}"
+        parts.append(Part(name, (starts[0], starts[0] + sum(sizes)), (first[0], first[0] + sum(counts)), name))
+    return tuple(parts)
