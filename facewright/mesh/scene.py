@@ -17,6 +17,7 @@ from facewright.mesh.tangents import corner_tangents, from_tangent_space
 
 AMBIENT = 0.16
 MAX_LAYERS = 4
+MIN_ROUGHNESS = 0.18
 EDGE_THRESHOLD = 0.04
 RAY_CHUNK = 1 << 17
 
@@ -220,18 +221,25 @@ def _bilinear(image, uv):
 
 
 def _lit(local, color, roughness):
-    """Linear colours of camera-space normals (k, 3) under the lights: Lambert, and Blinn-Phong for smooth surfaces."""
+    """Linear colours of camera-space normals (k, 3) under the lights: Lambert, and for smooth surfaces the key light's
+    highlight (Blinn-Phong; three lights would put three dots into an eye).
+    """
     light = np.full(len(local), AMBIENT, np.float32)
-    shine = np.zeros(len(local), np.float32)
-    glossy = np.flatnonzero(roughness < 0.5)
-    power = 2.0 / np.maximum(roughness[glossy], 0.12) ** 4 - 2.0
     for x, y, z, strength in LIGHTS:
-        direction = normalized(np.array([x, y, z], np.float32))
-        light += np.float32(strength) * np.maximum(local @ direction, 0.0)
-        half = normalized(direction + np.float32([0, 0, 1]))
-        facing = np.maximum(local[glossy] @ half, 0.0)
-        shine[glossy] += strength * 0.04 * (power + 2.0) / 8.0 * facing**power
-    return color * light[:, None] + np.minimum(shine, 2.0)[:, None]
+        light += np.float32(strength) * np.maximum(local @ _unit(x, y, z), 0.0)
+    image = color * light[:, None]
+    glossy = np.flatnonzero(roughness < 0.5)
+    if len(glossy):
+        x, y, z, strength = LIGHTS[0]
+        power = 2.0 / np.maximum(roughness[glossy], MIN_ROUGHNESS) ** 4 - 2.0
+        facing = np.maximum(local[glossy] @ _unit(*(_unit(x, y, z) + [0, 0, 1])), 0.0)
+        shine = strength * 0.04 * (power + 2.0) / 8.0 * facing**power
+        image[glossy] += np.minimum(shine, 2.0)[:, None]
+    return image
+
+
+def _unit(x, y, z):
+    return np.array([x, y, z], np.float32) / np.float32(np.sqrt(x * x + y * y + z * z))
 
 
 def _edges(image):
