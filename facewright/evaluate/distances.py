@@ -114,13 +114,14 @@ def benchmark_scale(interpupillary):
     return INTERPUPILLARY_MM / interpupillary if interpupillary else 1.0
 
 
-def scan_to_face(scan, fit, faces, regions, *, subset=None, count=40000):
+def scan_to_face(scan, fit, faces, regions, *, subset=None, hidden=None, painted=False, count=40000):
     """Distances of area-even scan samples to the fit, by region of the nearest fit point.
 
     scan     (vertices (s, 3), faces (t, 3)); subset (t,) bool limits the samples to some of its faces
+    hidden   (t,) bool: faces in a pocket of the scan (its own mouth bag): left out and counted
     fit      (n, 3), faces (m, 3) the template's surface; regions dict name -> (n,) bool
-    returns  dict name -> summary, with `left_out` the share of all samples whose nearest point is not in the region
-             (meaningful with a subset that was painted for that region), and "normal_deg": the angles' mean by region
+    painted  the subset was painted for the region: a sample whose nearest point is not in it is left out and counted
+    returns  dict name -> summary, each with the mean angle between the normals as "normal_deg_mean"
     """
     vertices, scan_faces = scan
     samples = sample_surface(vertices, scan_faces, count, subset)
@@ -129,11 +130,14 @@ def scan_to_face(scan, fit, faces, regions, *, subset=None, count=40000):
         interpolate(vertex_normals(vertices, scan_faces), scan_faces, samples.faces, samples.barycentric),
         interpolate(vertex_normals(fit, faces), faces, nearest.faces, nearest.barycentric),
     )
+    seen = np.ones(len(samples.faces), bool) if hidden is None else ~hidden[samples.faces]
     result = {}
     for name, mask in regions.items():
         inside = in_region(mask, faces, nearest.faces, nearest.barycentric)
-        result[name] = summary(nearest.distance[inside], 1.0 - inside.mean() if len(inside) else 1.0)
-        result[name]["normal_deg_mean"] = float(angles[inside].mean()) if inside.any() else None
+        counted = inside & seen
+        asked = len(inside) if painted else inside.sum()
+        result[name] = summary(nearest.distance[counted], 1.0 - counted.sum() / max(asked, 1))
+        result[name]["normal_deg_mean"] = float(angles[counted].mean()) if counted.any() else None
     return result
 
 
@@ -168,15 +172,21 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
         "lips": regions["lips"],
         "nostrils": regions["nostrils"],
     }
-    near = _visible_faces_near(scan, fit[asked["face"]]) if subset is None else subset
     surface = (scan.vertices * scale, scan.faces)
-    to_face = scan_to_face(surface, fit * scale, faces, asked, subset=near, count=count)
-    to_scan = face_to_scan(surface, fit * scale, faces, asked, count=count // 2)
+    hidden = _pockets(scan, _faces_near(scan, fit[asked["face"]], 5.0))
+    to_face, to_scan = {}, {}
+    for name, samples, margin_mm in (("face", count, 40.0), ("lips", count // 4, 10.0), ("nostrils", count // 4, 10.0)):
+        one = {name: asked[name]}
+        painted = subset is not None and name == "face"
+        near = subset if painted else _faces_near(scan, fit[asked[name]], margin_mm)
+        options = {"subset": near, "painted": painted, "count": samples}
+        if name != "nostrils":
+            options["hidden"] = hidden
+        to_face |= scan_to_face(surface, fit * scale, faces, one, **options)
+        to_scan |= face_to_scan(surface, fit * scale, faces, one, count=samples // 2)
     normal_deg = to_face["face"]["normal_deg_mean"]
     for figures in to_face.values():
         del figures["normal_deg_mean"]
-        if subset is None:
-            figures["left_out"] = 0.0
     return {
         "scan_to_face": to_face["face"],
         "face_to_scan": to_scan["face"],
@@ -186,14 +196,19 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
     }
 
 
-def _visible_faces_near(scan, points):
-    """As _faces_near, without the scan's own mouth bag and pouches: what no camera sees is no skin to compare with."""
-    openness = vertex_openness(scan.vertices, scan.faces, n_directions=64)[scan.faces].mean(axis=1)
-    return _faces_near(scan, points) & (openness > HIDDEN)
+def _pockets(scan, near):
+    """(t,) bool: faces among `near` (t,) that lie in a pocket of the scan: what no camera sees is no skin to compare."""
+    used, local = np.unique(scan.faces[near], return_inverse=True)
+    openness = vertex_openness(scan.vertices, scan.faces, n_directions=64, subset=used)
+    hidden = np.zeros(len(scan.faces), bool)
+    hidden[near] = openness[local.reshape(-1, 3)].mean(axis=1) <= HIDDEN
+    return hidden
 
 
-def _faces_near(scan, points, margin_mm=40.0):
+def _faces_near(scan, points, margin_mm):
     """(t,) bool: scan faces within the box of points (k, 3) and a margin, so that samples go where they count."""
+    if not len(points):
+        return np.zeros(len(scan.faces), bool)
     centers = scan.vertices[scan.faces].mean(axis=1)
     return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
 
