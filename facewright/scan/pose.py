@@ -84,8 +84,9 @@ def find_landmarks(scan, options=LandmarkOptions()):
     _check_options(options)
     scan = _mirrored(scan) if options.mirror else scan
     to_search = search_frame(scan.vertices, scan.faces)
-    subject = Subject.of(transform(to_search, scan.vertices), scan.faces)
+    subject = Subject.of(transform(to_search, scan.vertices), scan.faces, reach=1.0)
     T, warnings = _stand_up(scan, subject, to_search, options)
+    subject = subject.shaded_over(2.0 / np.cbrt(np.linalg.det(T[:3, :3])))
     flipped = _is_upside_down(scan, subject, T)
     if flipped:
         scan = _with_uv_flipped(scan)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -49,6 +49,10 @@ class Subject:
         """reach: over how much the shading is averaged, about 2 mm."""
         normals = shading_normals(vertices, faces, reach=reach)
         return Subject(vertices, faces, RayScene(vertices, faces), normals, face_normals(vertices, faces))
+
+    def shaded_over(self, reach):
+        """The same subject with its shading averaged over another reach."""
+        return replace(self, normals=shading_normals(self.vertices, self.faces, reach=reach))
 
 
 @dataclass(frozen=True)
