@@ -15,6 +15,7 @@ from facewright.mesh.raster import RayScene
 from facewright.mesh.render import BACKGROUND, CLAY, LIGHTS, linear_to_srgb, srgb_to_linear
 from facewright.mesh.tangents import corner_tangents, from_tangent_space
 
+CLAY_LINEAR = srgb_to_linear(np.array(CLAY))
 AMBIENT = 0.16
 MAX_LAYERS = 4
 MIN_ROUGHNESS = 0.18
@@ -37,7 +38,7 @@ class Drawable:
 
     vertices: np.ndarray
     faces: np.ndarray
-    color: tuple[float, float, float] | np.ndarray = tuple(float(c) for c in srgb_to_linear(np.array(CLAY)))
+    color: tuple[float, float, float] | np.ndarray = CLAY_LINEAR
     texture: np.ndarray | None = None
     normal_map: np.ndarray | None = None
     uv: np.ndarray | None = None

@@ -11,8 +11,8 @@ from PIL import Image
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.raster import Camera
-from facewright.mesh.render import CLAY, srgb_to_linear
-from facewright.mesh.scene import Drawable, Scene
+from facewright.mesh.render import srgb_to_linear
+from facewright.mesh.scene import CLAY_LINEAR, Drawable, Scene
 from facewright.write.files import replace_file
 from facewright.write.sheet import PANEL, Cell, Section, color_bar, compose_sheet
 
@@ -28,7 +28,6 @@ HEAT_LIMIT_MM = 0.5
 HEAT_STOPS = np.array([(38, 52, 92), (46, 132, 140), (236, 212, 110), (206, 58, 48)], float)
 NOT_SEEN = (88, 88, 94)
 INNER_SHADE = 0.45
-_CLAY_LINEAR = srgb_to_linear(np.array(CLAY))
 
 
 def write_preview(rig, scan, face, path, jobs=2):
@@ -154,7 +153,7 @@ def _rig_drawables(rig, textured, targets=()):
 
 def _clay_with_dark_inside(rig):
     """(n, 3) linear clay, darker inside mouth, sockets and nostrils, where no light would reach."""
-    color = np.tile(_CLAY_LINEAR, (len(rig.meshes[0].vertices), 1))
+    color = np.tile(CLAY_LINEAR, (len(rig.meshes[0].vertices), 1))
     for name in ("mouth_interior", "socket_left", "socket_right", "nostrils"):
         if name in rig.regions:
             color[rig.regions[name]] *= INNER_SHADE
