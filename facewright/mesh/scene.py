@@ -28,7 +28,7 @@ class Drawable:
     """A mesh and how it looks.
 
     vertices (n, 3) mm, faces (m, 3)
-    color      linear RGB 0..1: (3,) or (n, 3)
+    color      linear RGB 0..1: (3,) or (n, 3); default clay
     texture    (h, w, 3 or 4) uint8 sRGB, takes the place of color; a fourth channel is opacity
     normal_map (h, w, 3) uint8, tangent space, +Y; both with uv (t, 2), v up, and uv_faces (m, 3)
     roughness  0..1: below about 0.5 a highlight shows
@@ -38,7 +38,7 @@ class Drawable:
 
     vertices: np.ndarray
     faces: np.ndarray
-    color: tuple[float, float, float] | np.ndarray = CLAY_LINEAR
+    color: tuple[float, float, float] | np.ndarray | None = None
     texture: np.ndarray | None = None
     normal_map: np.ndarray | None = None
     uv: np.ndarray | None = None
@@ -183,7 +183,8 @@ def _normals(drawable):
 
 
 def _vertex_colors(drawable):
-    return np.broadcast_to(drawable.color, (len(drawable.vertices), 3))
+    color = CLAY_LINEAR if drawable.color is None else drawable.color
+    return np.broadcast_to(color, (len(drawable.vertices), 3))
 
 
 def _median_uv_per_mm(drawable):
