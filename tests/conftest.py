@@ -151,3 +151,26 @@ def ball_scan():
         return data.Scan(radius * directions, faces, colors=None if color is None else color(directions))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def hm08():
+    """The shipped template."""
+    from facewright.template.store import read_template
+
+    return read_template("hm08")
+
+
+@pytest.fixture(scope="session")
+def hm08_person(hm08):
+    """A function: the Face of a person of hm08's identity space, half a standard deviation from the mean per mode."""
+
+    def person(seed):
+        weights = np.random.default_rng(seed).standard_normal(len(hm08.identity_basis)) * 0.5
+        vertices = hm08.vertices + np.tensordot(weights, hm08.identity_basis, 1)
+        seen = np.ones(len(vertices), bool)
+        return data.Face(
+            hm08, vertices, vertices, hm08.regions, hm08.lines, seen, {}, {"left": False, "right": False}, {}
+        )
+
+    return person

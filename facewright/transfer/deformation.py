@@ -130,7 +130,7 @@ class DeformationTransfer:
         self.faces = faces[moving_faces]
         self.fixed = fixed
         self._normals = face_normals(self.source, self.faces)
-        links = (*links, nearest_links(self.source, faces, fixed))
+        links = (*links, nearest_links(source, faces, fixed))
         self._pairs = np.concatenate([link.pairs for link in links])
         self._pair_weights = np.concatenate([link.weights for link in links])
         self._pair_by_gap = np.concatenate([np.full(len(link.pairs), link.by_gap) for link in links])
@@ -146,11 +146,10 @@ class DeformationTransfer:
         P = divergence @ _target_edges_in_source_frames(self.source, target, faces)  # (m, 3, 3): ab, ac, normal
         rows, columns = np.repeat(faces, 3, axis=1), np.tile(faces, (1, 3))
         on_corners = np.stack([-P[:, :, 0] - P[:, :, 1], P[:, :, 0], P[:, :, 1]], axis=2)
-        self._from_vertices = _sparse(rows, columns, on_corners, (n, n))[free]
-        face_index = np.repeat(np.arange(len(faces)), 3)
-        self._from_normals = _sparse(faces, face_index, P[:, :, 2], (n, len(faces)))[free]
+        self._from_vertices = _sparse(rows, columns, on_corners, (n, n))
+        self._from_normals = P[:, :, 2]  # (m, 3 corners)
         signs = np.tile(self._pair_weights, 2) * np.repeat([1.0, -1.0], len(pairs))
-        self._from_gaps = _sparse(pairs.T, np.tile(np.arange(len(pairs)), 2), signs, (n, len(pairs)))[free]
+        self._from_gaps = _sparse(pairs.T, np.tile(np.arange(len(pairs)), 2), signs, (n, len(pairs)))
         self._gap_maps = _gap_maps(self.source, target, pairs, self._pair_by_gap)
         laplacian = np.concatenate([-divergence.sum(axis=2, keepdims=True), divergence], axis=2)
         matrix = _sparse(rows, columns, laplacian, (n, n)) + _pair_laplacian(pairs, self._pair_weights, n)
@@ -172,9 +171,14 @@ class DeformationTransfer:
             result[:, self.fixed] = held[:, self.fixed]
         if self._factor is None or not len(deltas):
             return result
-        rhs = self._right_hand_sides(deltas if base is None else deltas + base)
-        if base is not None:
-            rhs -= self._right_hand_sides(np.broadcast_to(base, deltas.shape))
+        rhs = np.empty((int((~self.fixed).sum()), len(deltas), 3))
+        starts = [None] * len(deltas) if base is None else np.broadcast_to(base, deltas.shape)
+        for k, (delta, start) in enumerate(zip(deltas, starts)):
+            if start is None:
+                rhs[:, k] = self._right_hand_side(delta)
+            else:
+                rhs[:, k] = self._right_hand_side(start + delta) - self._right_hand_side(start)
+        rhs = rhs.reshape(len(rhs), -1)
         if held is not None:
             known = result[:, self.fixed].transpose(1, 0, 2)
             rhs -= self._from_held @ known.reshape(len(known), -1)
@@ -182,33 +186,30 @@ class DeformationTransfer:
         result[:, ~self.fixed] = solution.reshape(len(solution), -1, 3).transpose(1, 0, 2)
         return result
 
-    def _right_hand_sides(self, deltas):
-        """(free vertices, 3k) of deltas (k, n, 3) in the source's own frame."""
-        k, n = deltas.shape[:2]
-        turned = np.empty((n, k, 3))
-        normal_change = np.zeros((len(self.faces), k, 3))
-        for shape, delta in enumerate(deltas):
-            turned[:, shape] = delta @ self.rotation.T
-            at, change = self._normal_change(turned[:, shape])
-            normal_change[at, shape] = change
-        rhs = self._from_vertices @ turned.reshape(n, -1) + self._from_normals @ normal_change.reshape(-1, 3 * k)
-        if len(self._pairs):
-            gaps = turned[self._pairs[:, 0]] - turned[self._pairs[:, 1]]  # (l, k, 3)
-            rhs += self._from_gaps @ (gaps @ self._gap_maps.transpose(0, 2, 1)).reshape(len(gaps), -1)
-        return rhs
-
-    def _normal_change(self, delta):
-        """Faces that move under one shape (a,) and the change of their unit normals (a, 3)."""
-        x, y, z = delta.T
-        moving = (x != 0) | (y != 0) | (z != 0)
+    def _right_hand_side(self, delta):
+        """(free vertices, 3) of one shape (n, 3) of the source; faces at rest are skipped."""
+        delta = delta @ self.rotation.T
+        rhs = self._from_vertices @ delta
+        moving = (delta[:, 0] != 0) | (delta[:, 1] != 0) | (delta[:, 2] != 0)
         a, b, c = self.faces.T
         at = np.flatnonzero(moving[a] | moving[b] | moving[c])
+        faces = self.faces[at]
+        push = self._from_normals[at][:, :, None] * self._normal_change(at, delta)[:, None, :]  # (a, corner, 3)
+        for axis in range(3):
+            rhs[:, axis] += np.bincount(faces.ravel(), weights=push[:, :, axis].ravel(), minlength=len(rhs))
+        if len(self._pairs):
+            gaps = delta[self._pairs[:, 0]] - delta[self._pairs[:, 1]]
+            rhs += self._from_gaps @ np.einsum("lij,lj->li", self._gap_maps, gaps)
+        return rhs[~self.fixed]
+
+    def _normal_change(self, at, delta):
+        """(a, 3) change of the unit normals of faces at (a,); none where a face collapses."""
         corners = (self.source + delta)[self.faces[at]]
         normals = normalized(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         collapsed = ~normals.any(axis=1)
         change = normals - self._normals[at]
         change[collapsed] = 0.0
-        return at, change
+        return change
 
 
 def _gap_maps(source, target, pairs, by_gap):

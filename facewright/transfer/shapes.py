@@ -177,8 +177,9 @@ def _hinges(template, V, rotation, lead, turns, result):
     rest = skin_deltas[k] - (skin - joint) @ by.T
     bone = (deltas[k] - (source - joint) @ by.T).mean(axis=0)
     weights = np.exp(-((np.linalg.norm(rest - bone, axis=1) / _RIGID_SKIN_MM) ** 2))
-    weights *= np.linalg.norm(skin_deltas[k], axis=1) > 0.1 * np.abs(deltas[k]).max()
-    if weights.sum() < 10 or np.abs(by).max() < 0.05:
+    reach = np.linalg.norm(skin_deltas[k], axis=1)
+    weights *= np.clip(reach / reach.max() - 0.1, 0.0, 1.0)
+    if weights.sum() < 10 or np.linalg.norm(by) < 0.05:
         return joint, carried
     at = template.skin.vertex_slice
     offset = weights @ (result[k, at] - V[at] @ by.T - similarity[1] * rest) / weights.sum()

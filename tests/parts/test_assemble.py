@@ -1,0 +1,96 @@
+"""The Rig has what the face has: a mesh per part, targets where something moves, eyes that look like eyes."""
+
+import numpy as np
+import pytest
+
+from facewright.conventions import ARKIT_SHAPES
+from facewright.parts import AssemblyOptions, build_rig, fit_parts
+from facewright.parts.eyes import measure_eyeball
+from facewright.parts.iris import EyeLook, eye_colors, paint_eye
+
+
+@pytest.fixture(scope="module")
+def person(hm08_person):
+    return fit_parts(hm08_person(1))
+
+
+@pytest.fixture(scope="module")
+def rig(hm08, person):
+    maps = {"albedo": np.full((8, 8, 3), 90, np.uint8), "coverage": np.zeros((8, 8), np.uint8)}
+    return build_rig(person, hm08.deltas, maps)
+
+
+def test_one_mesh_per_part_and_the_skin_first(hm08, rig, person):
+    assert [mesh.name for mesh in rig.meshes] == [part.name for part in hm08.parts]
+    for mesh, part in zip(rig.meshes, hm08.parts):
+        assert np.array_equal(mesh.vertices, person.vertices[part.vertex_slice])
+        assert np.array_equal(mesh.faces + part.vertices[0], hm08.faces[part.face_slice])
+        assert np.array_equal(mesh.uv[mesh.uv_faces], hm08.uv[hm08.uv_faces[part.face_slice]])
+        n_triangles = len(mesh.polygons) + (mesh.polygons[:, 3] >= 0).sum()
+        assert n_triangles == len(mesh.faces) and mesh.polygons.max() < len(mesh.vertices)
+        assert ((mesh.polygons < 0) == (mesh.uv_polygons < 0)).all()
+
+
+def test_targets_are_all_or_none(rig):
+    assert rig.target_names == ARKIT_SHAPES
+    by_name = {mesh.name: mesh for mesh in rig.meshes}
+    assert by_name["teeth_upper"].deltas is None
+    assert all(len(by_name[name].deltas) == 52 for name in ("skin", "eye_left", "teeth_lower", "tongue"))
+
+
+def test_parts_hang_on_their_bones(rig):
+    names = rig.skeleton.names
+    by_name = {mesh.name: mesh for mesh in rig.meshes}
+    for mesh, bone in (("eye_left", "eye_left"), ("teeth_upper", "head"), ("teeth_lower", "jaw"), ("tongue", "jaw")):
+        assert (by_name[mesh].skin_weights[:, names.index(bone)] == 1).all(), mesh
+    assert all(np.allclose(mesh.skin_weights.sum(axis=1), 1) for mesh in rig.meshes)
+
+
+def test_only_the_skin_takes_the_skins_maps(rig):
+    skin = rig.meshes[0].material
+    assert skin.albedo == "albedo" and skin.normal is None and skin.color == (1.0, 1.0, 1.0)
+    assert "coverage" not in rig.maps
+    assert {mesh.material.albedo for mesh in rig.meshes[1:]} == {"eye_left_albedo", "eye_right_albedo", None}
+    assert {name for mesh in rig.meshes for name in (mesh.material.albedo, mesh.material.normal) if name} <= set(
+        rig.maps
+    )
+
+
+def test_regions_and_lines_are_the_skins(rig, person):
+    n = len(rig.meshes[0].vertices)
+    assert all(mask.shape == (n,) for mask in rig.regions.values()) and rig.regions["face"].any()
+    assert np.array_equal(rig.lines["lip_seam_upper"], person.lines["lip_seam_upper"])
+
+
+def test_info_names_its_sources(hm08, rig):
+    assert rig.info["topology_id"] == hm08.info["topology_id"] and rig.info["licence"] == "CC0-1.0"
+    assert isinstance(rig.info["credits"], list) and rig.info["credits"]
+
+
+def test_parts_can_be_left_out_and_eyes_plain(hm08, person):
+    rig = build_rig(person, hm08.deltas, options=AssemblyOptions(eyes=None, left_out=("teeth",)))
+    assert [mesh.name for mesh in rig.meshes] == ["skin", "eye_left", "eye_right", "tongue"] and not rig.maps
+
+
+def test_an_eye_has_pupil_iris_and_white():
+    look = EyeLook()
+    angles = np.radians([0, look.pupil_deg - 3, 19, look.iris_deg + 4, 40])
+    colors = eye_colors(np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=1), look=look)
+    light = colors.mean(axis=1)
+    assert light[:2].max() < 0.01 < 0.05 < light[2] < 0.3 and light[3:].min() > 0.6
+
+
+def test_the_painted_eye_follows_its_axis_and_uvs(hm08):
+    part = hm08.part("eye_left")
+    image = paint_eye(
+        hm08.vertices[part.vertex_slice],
+        hm08.faces[part.face_slice] - part.vertices[0],
+        hm08.uv,
+        hm08.uv_faces[part.face_slice],
+        measure_eyeball(hm08, "left"),
+        EyeLook(size=64),
+    )
+    apex = np.argmax(hm08.vertices[part.vertex_slice][:, 2]) + part.vertices[0]
+    u, v = hm08.uv[hm08.uv_faces[part.face_slice][hm08.faces[part.face_slice] == apex][0]]
+    pupil = image[min(63, int((1 - v) * 64)), min(63, int(u * 64))]
+    assert image.shape == (64, 64, 3) and pupil.max() < 30 and image.max() > 200
