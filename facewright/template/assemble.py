@@ -90,10 +90,18 @@ def _picked(entry, vertices, polygons, uv_polygons, source_shapes):
         picked &= moving[corners].any(axis=1)
     for key in ("facing_deg", "not_facing_deg"):
         if key in entry:
-            center, _ = fit_sphere(vertices[np.unique(corners[picked])])
+            center, axis = _gaze(vertices[np.unique(corners[picked])])
             away = normalized(polygon_centers(vertices, polygons) - center)
-            picked &= (away[:, 2] > np.cos(np.radians(entry[key]))) == (key == "facing_deg")
+            picked &= (away @ axis > np.cos(np.radians(entry[key]))) == (key == "facing_deg")
     return picked
+
+
+def _gaze(points):
+    """Centre (3,) of an eyeball and the unit direction of its cornea: where it bulges, else straight ahead."""
+    center, radius = fit_sphere(points)
+    away = points - center
+    bulge = away[np.linalg.norm(away, axis=1) > 1.05 * radius]
+    return center, normalized(bulge.mean(axis=0)) if len(bulge) else np.array([0.0, 0.0, 1.0])
 
 
 def fit_sphere(points, rounds=5):

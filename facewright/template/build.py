@@ -51,7 +51,7 @@ def build_template(source_folder, description_path):
     openness = skin_openness(head)
     regions = skin_regions(head, openness, loops, lines)
 
-    deltas = _shape_rules(description, shaped, vertices, names, deltas, head)
+    deltas = _shape_rules(description, shaped, vertices, names, deltas, head, lines)
     identity = _even_eyes(shaped, vertices, identity, head)
     regions = _whole_head(regions, len(vertices))
     regions["skull"] = regions["outer"] & still_region(deltas, 0.05)
@@ -183,7 +183,7 @@ def _closed_lips(description, shaped, vertices, identity, head, lines):
     return closed, modes
 
 
-def _shape_rules(description, shaped, vertices, names, deltas, head):
+def _shape_rules(description, shaped, vertices, names, deltas, head, lines):
     """Deltas with turning eyes and a tongue that comes out, as the description asks."""
     options = description.get("rules", {})
     deltas = deltas.copy()
@@ -195,20 +195,23 @@ def _shape_rules(description, shaped, vertices, names, deltas, head):
                     s = part.vertex_slice
                     deltas[names.index(name), s] = rules.turned(vertices[s], center, yaw, pitch)
     if "tongue_out" in options:
+        jaw_open = deltas[names.index("jawOpen")]
+        lips = 0.5 * (vertices[lines["lip_seam_upper"]] + vertices[lines["lip_seam_lower"]])
         deltas[names.index("tongueOut")] = _tongue_out(
-            options["tongue_out"], shaped, vertices, deltas[names.index("jawOpen")]
+            options["tongue_out"], shaped, vertices, jaw_open, lips[len(lips) // 2]
         )
     return deltas
 
 
-def _tongue_out(options, shaped, vertices, jaw_open):
-    """(n, 3) the tongue comes out between lips and teeth that part by a share of jawOpen."""
+def _tongue_out(options, shaped, vertices, jaw_open, lips):
+    """(n, 3) the tongue comes out between lips and teeth that part by a share of jawOpen; lips (3,) their middle."""
     part = shaped.part("tongue")
     points, faces = _part_mesh(shaped, vertices, part)
     delta = float(options["jaw_open"]) * jaw_open
     border = np.flatnonzero(border_vertices(faces, len(points)))
-    delta[part.vertex_slice] += rules.tongue_out(
-        points, faces, border, float(options["tip_mm"]), drop_deg=float(options["drop_deg"])
+    target = lips + [0.0, -float(options["drop_mm"]), float(options["out_mm"])]
+    delta[part.vertex_slice] = rules.tongue_out(
+        points, faces, border, delta[part.vertex_slice], target, thin=float(options["thin"])
     )
     return delta
 

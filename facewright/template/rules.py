@@ -75,21 +75,25 @@ def eye_turns(side, degrees):
     }
 
 
-def tongue_out(vertices, faces, border, tip_mm, *, drop_deg=28.0):
-    """Displacements (k, 3) that bring a tongue out: root and border stay, the tip goes tip_mm forward in an arc.
+def tongue_out(vertices, faces, border, jaw, tip_target, *, thin=0.3):
+    """Displacements (k, 3) that bring a tongue out over the lower teeth and lip.
 
-    vertices (k, 3) mm and faces of the tongue alone; border (b,) indices that are held, where it joins the gums
-    The way forward f grows smoothly from the root to the tip; the arc bends down by drop_deg at the tip.
+    vertices (k, 3) mm and faces of the tongue alone; border (b,) indices where it joins the gums
+    jaw        (k, 3) what the opening jaw does to the tongue; the border and the root follow it
+    tip_target (3,) where the tip comes to lie; the body rises faster than it advances, to clear the teeth
+    thin       share of its thickness that the tip loses
     """
-    z = vertices[:, 2]
+    y, z = vertices[:, 1], vertices[:, 2]
     root, tip = z.min(), z.max()
-    t = np.clip((z - root) / (tip - root), 0.0, 1.0)
-    share = _held_share(vertices, faces, border, t)
-    forward = share * tip_mm
-    bend = np.radians(drop_deg) * share**2
-    radius_part = forward * np.cos(bend)
-    drop = -forward * np.sin(bend)
-    return np.stack([np.zeros(len(z)), drop, radius_part], axis=1)
+    share = _held_share(vertices, faces, border, (z - root) / (tip - root))
+    rise = 1.0 - (1.0 - share) ** 2
+    body = np.polynomial.Polynomial.fit(z, y, 3)(z)
+    front = vertices[z > tip - 0.05 * (tip - root)].mean(axis=0)
+    way = np.asarray(tip_target) - front
+    forward = np.outer(share, [0.0, 0.0, way[2]])
+    upward = np.outer(rise, [0.0, way[1], 0.0])
+    upward[:, 1] -= thin * share * (y - body)
+    return (1.0 - rise)[:, None] * jaw + forward + upward
 
 
 def _held_share(vertices, faces, border, t):
