@@ -229,6 +229,8 @@ def turn_faces(scan, mask):
 def far_components(scan, points, *, reach):
     """(m,) bool: faces of components that keep further than reach from all of points (k, 3): shirts, stands."""
     component = face_components(scan.faces, len(scan.vertices))
+    if (component == component[0]).all():
+        return np.zeros(len(scan.faces), bool)
     distance = cKDTree(points).query(scan.vertices)[0][scan.faces].min(axis=1)
     nearest = np.full(int(component.max()) + 1, np.inf)
     np.minimum.at(nearest, component, distance)

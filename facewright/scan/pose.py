@@ -15,7 +15,17 @@ from facewright.errors import InputError
 from facewright.scan.clean import far_components, keep_faces, turn_faces
 from facewright.scan.detector import LANDMARK_NAMES
 from facewright.scan.landmark_files import landmark_index, place_landmarks
-from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, STABLE, VIEWS, face_cameras, fuse_sightings
+from facewright.scan.landmarks import (
+    EYE_LEFT,
+    EYE_RIGHT,
+    LIPS_INNER,
+    LIPS_OUTER,
+    NOSE,
+    STABLE,
+    VIEWS,
+    face_cameras,
+    fuse_sightings,
+)
 from facewright.scan.orientation import BELIEVED_MM, fit_canonical, search_faces, search_frame
 from facewright.scan.sightings import (
     CLAY_LOOKS,
@@ -93,9 +103,10 @@ def find_landmarks(scan, options=LandmarkOptions()):
         warnings.append("the texture was upside down (V of the file runs downward); it was turned")
     for views in (QUICK_VIEWS, VIEWS):
         landmarks, guess = _look(subject, T, wardrobe_of(scan), views)
-        T = guess.T
+        T = guess.T if landmarks.weights.any() else T
     landmarks = place_landmarks(landmarks, options.landmarks, scan)
-    T = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights).T
+    guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
+    T = guess.T
     ipd = _pupil_distance(scan, landmarks)
     unit_mm, source, more = choose_unit(ipd, scan.unit_mm, MM_PER_UNIT.get(options.units))
     T = _rescaled(T, unit_mm)
@@ -132,9 +143,6 @@ def wardrobe_of(scan):
 
 def _stand_up(scan, subject, to_search, options):
     """T (4, 4) that roughly brings the subject into our frame at 63 mm between the eyes, and warnings."""
-    by_hand = _stand_by_hand(scan, options.landmarks)
-    if by_hand is not None:
-        return by_hand @ np.linalg.inv(to_search), []
     up = None if options.up is None else np.array(AXES[options.up.lower()], float) * [-1 if options.mirror else 1, 1, 1]
     doubtful = []
     for looks in reversed(wardrobe_of(scan)):  # clay first: it cannot lie upside down
@@ -143,24 +151,32 @@ def _stand_up(scan, subject, to_search, options):
                 doubtful.append((guess, looks))
             elif (T := _confirmed(subject, looks, guess)) is not None:
                 return T, []
+    warnings = ["the face was hard to find; check the landmarks"]
+    by_hand = _stand_by_hand(scan, options.landmarks)
+    if by_hand is not None:
+        return by_hand @ np.linalg.inv(to_search), warnings
     doubtful.sort(key=lambda entry: entry[0].residual_mm)
     for guess, looks in doubtful[:4]:
         if (T := _confirmed(subject, looks, guess)) is not None:
-            return T, ["the face was hard to find; check the landmarks"]
+            return T, warnings
     raise InputError(
-        f"{scan.name}: no face was found on it; check that it is a head, or give a few landmarks with --landmarks"
+        f"{scan.name}: no face was found on it; check that it is a head, or give the corners of both eyes and of the "
+        "mouth with --landmarks"
     )
 
 
 def _stand_by_hand(scan, overrides):
-    """As _stand_up from the user's landmarks, where at least four of lips, eyes and nose are given; else None."""
+    """T (4, 4) from the scan's frame to ours by the user's landmarks, if they show both eyes and the mouth or nose."""
     points, weights = np.zeros((len(LANDMARK_NAMES), 3)), np.zeros(len(LANDMARK_NAMES))
     to_now = np.linalg.inv(scan.T_ours_to_scan)
     for name, value in overrides.items():
         index = landmark_index(name)
-        if index in STABLE and not isinstance(value, tuple):
-            points[index], weights[index] = to_now[:3, :3] @ value + to_now[:3, 3], 1.0
-    return fit_canonical(points, weights).T if weights.sum() >= 4 else None
+        if index in STABLE:
+            point = value[1] @ scan.vertices[scan.faces[value[0]]] if isinstance(value, tuple) else value
+            points[index] = point if isinstance(value, tuple) else transform(to_now, point[None])[0]
+            weights[index] = 1.0
+    enough = all(weights[list(group)].any() for group in (EYE_LEFT, EYE_RIGHT, LIPS_OUTER + LIPS_INNER + NOSE))
+    return fit_canonical(points, weights).T if enough and weights.sum() >= 4 else None
 
 
 def _confirmed(subject, looks, guess):
@@ -252,10 +268,9 @@ def _rescaled(T, unit_mm):
 def _head_only(scan, landmarks):
     """The scan and its landmarks without pieces far from the face, and how many faces went."""
     used = landmarks.weights > 0
-    reach = HEAD_REACH_MM
-    far = far_components(scan, landmarks.positions(scan.vertices, scan.faces)[used], reach=reach)
+    far = far_components(scan, landmarks.positions(scan.vertices, scan.faces)[used], reach=HEAD_REACH_MM)
     if not far.any():
         return scan, landmarks, 0
-    place = np.cumsum(~far) - 1
+    place = np.maximum(np.cumsum(~far) - 1, 0)  # landmarks without weight may lie on what goes
     kept = replace(landmarks, faces=place[landmarks.faces])
     return keep_faces(scan, ~far), kept, int(far.sum())
