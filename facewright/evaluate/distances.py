@@ -197,7 +197,7 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
 
 
 def _pockets(scan, near):
-    """(t,) bool: faces among `near` (t,) that lie in a pocket of the scan: what no camera sees is no skin to compare."""
+    """(t,) bool: faces among `near` (t,) in a pocket of the scan: what no camera sees is no skin to compare."""
     used, local = np.unique(scan.faces[near], return_inverse=True)
     openness = vertex_openness(scan.vertices, scan.faces, n_directions=64, subset=used)
     hidden = np.zeros(len(scan.faces), bool)

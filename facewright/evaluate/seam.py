@@ -175,8 +175,8 @@ def _locate(depth):
             break
         strength = max(strength, float(gap.max()))
         start, stop = _pocket(depth, closed, start, stop)
-    lowest = start + int(depth[start:stop].argmin())
-    middle = (start + stop - 1) / 2 if stop - start < 2 * DISCS_MM[-1] / STEP_MM else lowest
+    gap = (closed - depth)[start:stop] ** 2
+    middle = start + (gap @ np.arange(stop - start)) / gap.sum() if gap.sum() > 0 else (start + stop - 1) / 2
     height = _heights()[0] + middle * STEP_MM
     rim = (depth[max(start - 1, 0)] + depth[min(stop, len(depth) - 1)]) / 2
     return height, rim, strength

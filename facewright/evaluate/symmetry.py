@@ -32,5 +32,5 @@ def measure_symmetry(vertices, mirror, regions, names=("face", "lips", "eyes")):
     return {
         name: {"mean": float(half[regions[name]].mean()), "max": float(half[regions[name]].max())}
         for name in names
-        if regions[name].any()
+        if name in regions and regions[name].any()
     }

@@ -1,0 +1,105 @@
+"""Distances on shapes whose answer is known."""
+
+import numpy as np
+import pytest
+
+from facewright.evaluate import distances
+
+
+def plane(n=21, size=20.0, z=0.0):
+    """A square of n x n points in z, looking along +Z."""
+    x, y = np.meshgrid(np.linspace(0, size, n), np.linspace(0, size, n))
+    vertices = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)
+    grid = np.arange(n * n).reshape(n, n)
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    quads = np.stack([a, b, c, d], axis=2).reshape(-1, 4)
+    return vertices, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def test_samples_spread_by_area_and_lie_on_their_faces():
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 5], [3, 0, 5], [0, 3, 5]])
+    faces = np.array([[0, 1, 2], [3, 4, 5]])  # areas 0.5 and 4.5
+    samples = distances.sample_surface(vertices, faces, 1000)
+    assert (samples.faces == 1).sum() == 900
+    assert np.allclose(samples.barycentric.sum(axis=1), 1)
+    assert samples.barycentric.min() >= 0
+    assert set(np.unique(samples.points[:, 2])) == {0.0, 5.0}
+
+
+def test_samples_are_even_inside_a_face():
+    vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    points = distances.sample_surface(vertices, faces, 4000).points
+    assert np.allclose(points.mean(axis=0), [1 / 3, 1 / 3, 0], atol=2e-3)
+
+
+def test_samples_of_a_subset_stay_in_it():
+    vertices, faces = plane()
+    subset = np.arange(len(faces)) < 10
+    assert (distances.sample_surface(vertices, faces, 100, subset).faces < 10).all()
+    assert not len(distances.sample_surface(vertices, faces, 100, np.zeros(len(faces), bool)).points)
+
+
+def test_parallel_planes_are_their_gap_apart_both_ways():
+    scan, (fit, faces) = plane(z=0.5), plane(n=9)
+    everything = {"face": np.ones(len(fit), bool)}
+    there = distances.scan_to_face(scan, fit, faces, everything)["face"]
+    back = distances.face_to_scan(scan, fit, faces, everything)["face"]
+    for figures in (there, back):
+        assert figures["mean"] == pytest.approx(0.5)
+        assert figures["p95"] == pytest.approx(0.5)
+        assert figures["max"] == pytest.approx(0.5)
+        assert figures["rms"] == pytest.approx(0.5)
+    assert there["normal_deg_mean"] == pytest.approx(0.0, abs=1e-5)
+    assert there["left_out"] == 0.0
+
+
+def test_only_the_region_of_the_nearest_point_counts():
+    scan, (fit, faces) = plane(z=0.5), plane()
+    fit = fit.copy()
+    fit[fit[:, 0] > 10.0, 2] = -3.0  # the other half is far away
+    left = {"left": fit[:, 0] < 8.0}
+    figures = distances.scan_to_face(scan, fit, faces, left)["left"]
+    assert figures["max"] == pytest.approx(0.5)
+
+
+def test_beyond_the_border_of_the_scan_is_left_out_and_counted():
+    (scan, scan_faces), (fit, faces) = plane(size=10.0, n=11), plane(size=20.0, n=41, z=0.25)
+    figures = distances.face_to_scan((scan, scan_faces), fit, faces, {"all": np.ones(len(fit), bool)})["all"]
+    assert figures["left_out"] == pytest.approx(0.75, abs=0.01)
+    assert figures["max"] == pytest.approx(0.25)
+
+
+def test_painted_samples_outside_the_region_are_left_out_and_counted():
+    scan, (fit, faces) = plane(z=0.5), plane()
+    region = {"left": fit[:, 0] <= 10.0}
+    painted = np.ones(len(scan[1]), bool)
+    figures = distances.scan_to_face(scan, fit, faces, region, subset=painted, painted=True)["left"]
+    assert figures["left_out"] == pytest.approx(0.475, abs=0.02)
+
+
+def test_hidden_faces_are_left_out_and_counted():
+    scan, (fit, faces) = plane(z=0.5), plane()
+    hidden = scan[0][scan[1]].mean(axis=1)[:, 0] < 5.0
+    figures = distances.scan_to_face(scan, fit, faces, {"all": np.ones(len(fit), bool)}, hidden=hidden)["all"]
+    assert figures["left_out"] == pytest.approx(0.25, abs=0.01)
+
+
+def test_border_points_are_those_on_border_edges_and_corners():
+    _, faces = plane(n=3)  # one inner vertex, 4
+    at = np.array([f for f in range(len(faces)) if 4 in faces[f]])[:1]
+    inner = (faces[at[0]] == 4).astype(float)[None]
+    assert not distances.on_border(faces, at, inner)[0]
+    corner = (faces[0] == 0).astype(float)[None]
+    assert distances.on_border(faces, np.array([0]), corner)[0]
+    assert not distances.on_border(faces, at, np.full((1, 3), 1 / 3))[0]
+
+
+def test_no_samples_give_no_figures():
+    figures = distances.summary(np.empty(0), 1.0)
+    assert figures["mean"] is None
+    assert figures["left_out"] == 1.0
+
+
+def test_scale_brings_heads_to_63_mm():
+    assert distances.benchmark_scale(31.5) == 2.0
+    assert distances.benchmark_scale(None) == 1.0

@@ -1,0 +1,118 @@
+"""Folds, tears and crossings that were put in on purpose are found, and nothing else."""
+
+import numpy as np
+import pytest
+
+from facewright.evaluate import quality
+
+
+def sheet(n=15, size=14.0):
+    """A square sheet in the xy plane, looking along +Z."""
+    x, y = np.meshgrid(np.linspace(0, size, n), np.linspace(0, size, n))
+    vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    grid = np.arange(n * n).reshape(n, n)
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    quads = np.stack([a, b, c, d], axis=2).reshape(-1, 4)
+    return vertices, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def turn(degrees):
+    angle = np.radians(degrees)
+    return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+
+def test_a_sheet_that_lies_on_its_scan_has_no_fold():
+    vertices, faces = sheet()
+    assert not len(
+        quality.folded_faces((vertices, faces), vertices + [0.2, 0.1, 0.1], faces, np.ones(len(faces), bool))
+    )
+
+
+def test_a_vertex_pushed_past_its_neighbours_folds_faces():
+    vertices, faces = sheet()
+    moved = vertices.copy()
+    moved[7 * 15 + 7] += [2.5, 0.0, 0.05]
+    folded = quality.folded_faces((vertices, faces), moved, faces, np.ones(len(faces), bool))
+    expected = np.flatnonzero(np.cross(*np.moveaxis(np.diff(moved[faces], axis=1), 1, 0))[:, 2] < 0)
+    assert len(expected)
+    assert np.array_equal(folded, expected)
+
+
+def test_where_the_scan_has_no_surface_nothing_is_called_folded():
+    vertices, faces = sheet()
+    far = vertices + [0, 0, 9.0]
+    assert not len(quality.folded_faces((vertices, faces), far, faces[:, ::-1], np.ones(len(faces), bool)))
+
+
+def test_the_far_wall_of_a_narrow_crease_is_no_fold():
+    vertices, faces = sheet()
+    back = vertices + [0, 0, 0.3]  # two walls of a crease, 0.3 mm apart, facing each other
+    scan = np.vstack([vertices, back]), np.vstack([faces, faces[:, ::-1] + len(vertices)])
+    fit = vertices + [0, 0, 0.2]  # looks like the near wall, lies nearer to the far one
+    assert not len(quality.folded_faces(scan, fit, faces, np.ones(len(faces), bool)))
+
+
+def test_turning_a_head_folds_no_shape():
+    vertices, faces = sheet()
+    curved = vertices + np.stack([0 * vertices[:, 0], 0 * vertices[:, 0], 0.1 * vertices[:, 0] ** 2], axis=1)
+    assert not len(quality.folded_by_shape(curved, curved @ turn(170).T, faces))
+
+
+def test_a_shape_that_turns_a_face_over_is_found():
+    vertices, faces = sheet()
+    moved = vertices.copy()
+    moved[7 * 15 + 7] += [2.5, 0.0, 0.0]
+    turned = np.cross(*np.moveaxis(np.diff(moved[faces], axis=1), 1, 0))[:, 2] < 0
+    assert np.array_equal(quality.folded_by_shape(vertices, moved, faces), np.flatnonzero(turned))
+
+
+def test_torn_edges_need_both_length_and_factor():
+    vertices, faces = sheet()
+    moved = vertices.copy()
+    moved[0] -= [6.0, 0, 0]
+    torn = quality.torn_edges(vertices, moved, faces)
+    assert len(torn)
+    assert (torn == 0).any(axis=1).all()
+    assert not len(quality.torn_edges(vertices, vertices * 1.5, faces))
+    assert not len(quality.torn_edges(vertices, moved, faces, mask=np.arange(len(vertices)) > 0))
+
+
+def test_two_sheets_that_cross_are_counted_once_per_pair():
+    vertices, faces = sheet(n=5, size=4.0)
+    other = (vertices - [2, 2, 0]) @ turn(90).T + [2.03, 2.07, 0.01]
+    both, both_faces = np.vstack([vertices, other]), np.vstack([faces, faces + len(vertices)])
+    pairs = quality.self_intersections(both, both_faces)
+    assert len(pairs)
+    assert (pairs[:, 0] < len(faces)).all() and (pairs[:, 1] >= len(faces)).all()
+    assert not len(quality.self_intersections(vertices, faces))
+    assert len(quality.self_intersections(both, both_faces, np.arange(len(both_faces)) < len(faces))) == 0
+
+
+def test_crossings_of_the_reference_are_not_new():
+    vertices, faces = sheet(n=5, size=4.0)
+    other = (vertices - [2, 2, 0]) @ turn(90).T + [2.03, 2.07, 0.01]
+    both, both_faces = np.vstack([vertices, other]), np.vstack([faces, faces + len(vertices)])
+    apart = np.vstack([vertices, other + [9.0, 0, 0]])
+    everything = np.ones(len(both_faces), bool)
+    assert not len(quality.new_self_intersections(both, both, both_faces, everything, everything))
+    assert len(quality.new_self_intersections(both, apart, both_faces, everything, everything))
+
+
+def test_an_opening_shows_its_area():
+    front, faces = sheet(n=41, size=40.0)
+    centers = front[faces].mean(axis=1)
+    hole = (np.abs(centers - [20, 20, 0]) < [5, 2, 1]).all(axis=1)
+    back = front - [0, 0, 10.0]
+    vertices = np.vstack([front, back])
+    all_faces = np.vstack([faces[~hole], faces + len(front)])
+    interior = np.arange(len(all_faces)) >= (~hole).sum()
+    seen = quality.visible_interior_mm2(
+        vertices, all_faces, interior, [20, 20, 0.0], width_mm=30.0, views=((0.0, 0.0),)
+    )
+    assert seen == pytest.approx(hole.sum() * 0.5, rel=0.02)
+
+
+def test_lip_gaps_are_measured_pair_by_pair():
+    vertices = np.array([[0.0, 0, 0], [1, 0.2, 0], [2, 0, 0], [1, -0.3, 0]])
+    lines = {"lip_seam_upper": np.array([0, 1, 2]), "lip_seam_lower": np.array([0, 3, 2])}
+    assert np.allclose(quality.lip_gaps_mm(vertices, lines), [0, 0.5, 0])
