@@ -31,6 +31,7 @@ def build_template(source_folder, description_path):
     description = read_description(description_path)
     unit = float(description["source"]["unit_mm"])
     neutral = read_source_mesh(folder / description["source"]["neutral"])
+    _check_counts(description, neutral)
     source_shapes = _read_shapes(folder, description, neutral.vertices, unit)
     shaped = assemble(description, neutral, unit, source_shapes)
 
@@ -79,6 +80,17 @@ def build_template(source_folder, description_path):
         materials=description["materials"],
         info=dict(description["info"]) | {"rules": sorted(description.get("rules", {}))},
     )
+
+
+def _check_counts(description, neutral):
+    """InputError unless the neutral has as many vertices and polygons as the description was written for."""
+    for key in ("vertices", "polygons"):
+        expected, got = description["source"].get(key), len(getattr(neutral, key))
+        if expected is not None and got != expected:
+            raise InputError(
+                f"template source: the neutral has {got} {key}, the description is for {expected}; "
+                "use the release that it was written for"
+            )
 
 
 def _read_shapes(folder, description, neutral, unit):

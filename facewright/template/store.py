@@ -242,6 +242,12 @@ def _describe(template):
     return {
         "format": FORMAT,
         "info": {**_plain(template.info), "topology_id": topology_id(template)},
+        "counts": {
+            "vertices": len(template.vertices),
+            "faces": len(template.faces),
+            "identity_modes": len(template.identity_basis),
+            "landmarks": len(template.landmarks.names),
+        },
         "shapes": list(template.shape_names),
         "regions": list(template.regions),
         "lines": [{"name": name, "count": len(line)} for name, line in template.lines.items()],
