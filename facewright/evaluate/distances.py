@@ -163,7 +163,8 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
     scan     a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template; regions default the template's
     subset   (t,) bool: only these faces of the scan are asked (a painted skin mask)
     scale    factor on every distance (benchmark_scale), 1 for plain millimetres
-    returns  dict scan_to_face, face_to_scan (region `face`, nostrils apart), lips.*, nostrils.*, normal_deg_mean
+    returns  dict scan_to_face_mm, face_to_scan_mm (region `face`, nostrils apart), the same under lips and nostrils,
+             normal_deg_mean
     """
     regions = template.regions if regions is None else regions
     faces = template.faces[surface_faces(template)]
@@ -188,10 +189,10 @@ def measure_distances(scan, fit, template, regions=None, *, subset=None, count=4
     for figures in to_face.values():
         del figures["normal_deg_mean"]
     return {
-        "scan_to_face": to_face["face"],
-        "face_to_scan": to_scan["face"],
-        "lips": {"scan_to_face": to_face["lips"], "face_to_scan": to_scan["lips"]},
-        "nostrils": {"scan_to_face": to_face["nostrils"], "face_to_scan": to_scan["nostrils"]},
+        "scan_to_face_mm": to_face["face"],
+        "face_to_scan_mm": to_scan["face"],
+        "lips": {"scan_to_face_mm": to_face["lips"], "face_to_scan_mm": to_scan["lips"]},
+        "nostrils": {"scan_to_face_mm": to_face["nostrils"], "face_to_scan_mm": to_scan["nostrils"]},
         "normal_deg_mean": normal_deg,
     }
 

@@ -80,9 +80,9 @@ def warnings(scan, face, registration, clean_stats, pose_info):
         notes.append(f"expression taken out of the neutral: {listed}")
     if not face.stats.get("lips_closed", True):
         notes.append("no crease between the lips was found on the scan: the mouth follows the model, look at it")
-    if registration["scan_to_face"]["p95"] is not None and registration["scan_to_face"]["p95"] > 1.0:
+    if registration["scan_to_face_mm"]["p95"] is not None and registration["scan_to_face_mm"]["p95"] > 1.0:
         notes.append(
-            f"the fit is poor: 5 % of the face are over {registration['scan_to_face']['p95']:.1f} mm from the scan; "
+            f"the fit is poor: 5 % of the face are over {registration['scan_to_face_mm']['p95']:.1f} mm from the scan; "
             "move landmarks with --landmarks"
         )
     if registration["folded"]:

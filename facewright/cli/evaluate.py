@@ -1,0 +1,104 @@
+"""Print the figures of a finished job: how well the fit met the scan, and whether the shapes are sound.
+
+facewright evaluate result/
+facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
+facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from facewright.errors import InputError
+
+HELP = "print the figures of a finished job"
+COLUMNS = ("mean", "rms", "p95", "max", "left_out")
+
+
+def add_arguments(parser):
+    """Arguments of `facewright evaluate`."""
+    parser.add_argument("result", metavar="FOLDER", help="a folder that `facewright rig` wrote")
+    parser.add_argument("--scan", metavar="FILE", help="the scan that the rig was made from")
+    parser.add_argument("--shapes", action="store_true", help="measure every shape too")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+
+
+def run(options):
+    """Collect the figures and print them."""
+    figures = collect(Path(options.result), options.scan, options.shapes)
+    if options.json:
+        print(json.dumps(figures, indent=1))
+        return
+    print_distances("the fit, as report.json has it (mm)", report_rows(figures["report"]["registration"]))
+    print_values(figures["report"]["registration"])
+    if "rig_to_scan" in figures:
+        rows = [
+            (f"{region} {way}", values)
+            for region, ways in figures["rig_to_scan"].items()
+            for way, values in ways.items()
+        ]
+        print_distances("the rig's neutral against the scan (mm)", rows)
+    for name, values in figures.get("shapes", {}).items():
+        print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
+
+
+def collect(folder, scan_file=None, shapes=False):
+    """dict: report, neutral, and if asked rig_to_scan and shapes."""
+    from facewright.evaluate.rig import measure_neutral, measure_rig_distances, measure_shapes
+    from facewright.write.rig import read_rig
+
+    rig = read_rig(folder / "rig")
+    figures = {"report": read_report(folder / "report.json"), "neutral": measure_neutral(rig)}
+    if scan_file is not None:
+        figures["rig_to_scan"] = measure_rig_distances(rig, scan_in_rig_frame(scan_file, rig))
+    if shapes:
+        figures["shapes"] = measure_shapes(rig)
+    return figures
+
+
+def scan_in_rig_frame(path, rig):
+    """The scan file, cleaned, in the frame of the rig's vertices."""
+    from facewright.evaluate.rig import rig_frame
+    from facewright.read import read_scan
+    from facewright.scan import clean_scan
+
+    scan, _ = clean_scan(read_scan(path))
+    return scan.transformed(rig_frame(rig))
+
+
+def read_report(path):
+    """report.json as a dict."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"evaluate: cannot read {path} ({error}); give a folder that `facewright rig` wrote"
+        ) from error
+
+
+def report_rows(registration):
+    """(name, summary) of every pair of distances in a report."""
+    rows = []
+    for region in ("", "lips", "nostrils"):
+        block = registration.get(region, {}) if region else registration
+        for key in ("scan_to_face_mm", "face_to_scan_mm"):
+            if key in block:
+                rows.append((f"{region or 'face'} {key.removesuffix('_mm').replace('_', ' ')}", block[key]))
+    return rows
+
+
+def print_distances(title, rows):
+    """A table of summaries."""
+    print(title)
+    print("  ".join(["".ljust(24), *(column.rjust(8) for column in COLUMNS)]))
+    for name, values in rows:
+        cells = ["-".rjust(8) if values[c] is None else f"{values[c]:8.3f}" for c in COLUMNS]
+        print("  ".join([name.ljust(24), *cells]))
+
+
+def print_values(registration):
+    """The single figures of a report, one a line."""
+    for name, value in sorted(registration.items()):
+        if isinstance(value, (int, float)):
+            print(f"{name.ljust(24)}  {value:8.3f}")

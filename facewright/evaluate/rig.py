@@ -1,0 +1,74 @@
+"""Figures of a finished rig: how far its neutral is from a scan, and whether its shapes are sound."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facewright.evaluate.distances import face_to_scan, scan_to_face
+from facewright.evaluate.quality import (
+    folded_by_shape,
+    lip_gaps_mm,
+    new_self_intersections,
+    region_faces,
+    torn_edges,
+)
+
+
+def measure_rig_distances(rig, scan, *, count=40000):
+    """dict region -> {"scan_to_rig", "rig_to_scan"} of the neutral in mm.
+
+    rig a data.Rig, scan a data.Scan in the rig's own frame (our frame, mm)
+    """
+    meshes = [mesh for mesh in rig.meshes if mesh.name in ("skin", "eye_left", "eye_right")]
+    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    vertices = np.vstack([mesh.vertices for mesh in meshes])
+    faces = np.vstack([mesh.faces + offset for mesh, offset in zip(meshes, offsets)])
+
+    def padded(mask):
+        return np.concatenate([mask, np.zeros(len(vertices) - len(mask), bool)])
+
+    regions = {name: padded(rig.regions[name]) for name in ("face", "lips", "eyes") if name in rig.regions}
+    if "nostrils" in rig.regions:
+        regions["face"] = regions["face"] & ~padded(rig.regions["nostrils"])
+    surface = (scan.vertices, scan.faces)
+    there = scan_to_face(surface, vertices, faces, regions, count=count)
+    back = face_to_scan(surface, vertices, faces, regions, count=count // 2)
+    return {name: {"scan_to_rig": there[name], "rig_to_scan": back[name]} for name in regions}
+
+
+def measure_shapes(rig):
+    """dict target -> {"max_mm", "folded", "torn", "crossing"} of every shape of the skin at weight 1.
+
+    folded and torn outside the inner mouth; crossing: new pairs of crossing faces with one in region `face`
+    """
+    skin = rig.meshes[0]
+    inner = rig.regions["mouth_interior"]
+    outside = ~inner[skin.faces].any(axis=1)
+    in_face = region_faces(rig.regions["face"], skin.faces)
+    everything = np.ones(len(skin.faces), bool)
+    result = {}
+    for name, deltas in zip(rig.target_names, skin.deltas):
+        moved = skin.vertices + deltas
+        crossing = new_self_intersections(moved, skin.vertices, skin.faces, everything, in_face)
+        result[name] = {
+            "max_mm": float(np.linalg.norm(deltas, axis=1).max()),
+            "folded": len(folded_by_shape(skin.vertices, moved, skin.faces, outside)),
+            "torn": len(torn_edges(skin.vertices, moved, skin.faces, ~inner)),
+            "crossing": len(crossing),
+        }
+    return result
+
+
+def measure_neutral(rig):
+    """dict of the neutral by itself: lip gap in mm, vertices and faces of all meshes."""
+    return {
+        "lip_gap_mm": float(lip_gaps_mm(rig.meshes[0].vertices, rig.lines).max()),
+        "vertices": sum(len(mesh.vertices) for mesh in rig.meshes),
+        "faces": sum(len(mesh.faces) for mesh in rig.meshes),
+    }
+
+
+def rig_frame(rig):
+    """(4, 4) the scan file's frame to that of the rig's vertices (mm): x_rig = T x_file, from info["T_rig_to_scan"]."""
+    T_metres_to_file = np.array(rig.info["T_rig_to_scan"], float)
+    return np.linalg.inv(T_metres_to_file @ np.diag([1e-3, 1e-3, 1e-3, 1.0]))
