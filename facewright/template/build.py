@@ -10,6 +10,7 @@ from facewright.conventions import ARKIT_SHAPES
 from facewright.data import Landmarks, Part, Template
 from facewright.errors import InputError
 from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.openness import vertex_openness
 from facewright.mesh.polygons import triangulated
 from facewright.template import rules
 from facewright.template.assemble import assemble, fit_sphere
@@ -74,7 +75,7 @@ def build_template(source_folder, description_path):
         shape_names=names,
         deltas=deltas,
         identity_basis=identity,
-        openness=np.concatenate([openness, np.ones(len(vertices) - len(openness))]),
+        openness=_openness(description, shaped, vertices, faces),
         skeleton=skeleton,
         skin_weights=skin_weights,
         materials=description["materials"],
@@ -189,7 +190,7 @@ def _closed_lips(description, shaped, vertices, identity, head, lines):
     radius = float(options["radius_mm"])
     closed, modes = vertices.copy(), identity.copy()
     closed[skin] = symmetrized(closed_lips(head.vertices, head.faces, upper, lower, radius_mm=radius), head.mirror)
-    keep = paired_modes(head.vertices, head.faces, upper, lower, radius_mm=radius)
+    keep = paired_modes(closed[skin], head.faces, upper, lower, radius_mm=radius)
     for mode in modes:
         mode[skin] += keep(mode[skin])
     return closed, modes
@@ -242,6 +243,17 @@ def _even_eyes(shaped, vertices, identity, head):
 def _whole_head(regions, n):
     """Masks of the skin as masks of all parts."""
     return {name: np.concatenate([mask, np.zeros(n - len(mask), bool)]) for name, mask in regions.items()}
+
+
+def _openness(description, shaped, vertices, faces):
+    """(n,) openness of all parts; thin things on the skin (lashes, fluid) cast no shadow and count as open."""
+    materials = description["materials"]
+    solid = [p for p in shaped.parts if p.attach != "skin" or materials[p.material].get("alpha", 1.0) >= 0.5]
+    chosen = np.concatenate([np.arange(*part.faces) for part in solid])
+    openness = np.ones(len(vertices))
+    members = np.concatenate([np.arange(*part.vertices) for part in solid])
+    openness[members] = vertex_openness(vertices, faces[chosen])[members]
+    return openness
 
 
 def _landmarks(shaped, vertices, faces, mirror, lips):

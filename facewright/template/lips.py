@@ -52,31 +52,62 @@ class SoftSpread:
         L = cotangent_laplacian(vertices, faces)
         mass = np.maximum(lumped_mass(vertices, faces), 1e-2)
         B = smooth_mm**4 * (L @ sp.diags(1.0 / mass) @ L) + 1e-3 * uniform_laplacian(faces, n)
-        self._B = B.tocsr()[self.inner][:, self.inner]
+        self.smoothness = B.tocsr()[self.inner][:, self.inner]
         self._n = n
 
     def __call__(self, wishes, weights):
         """(n, 3) field for wishes (n, 3) with weights (n,); 0 weight asks for nothing."""
         w = weights[self.inner]
         field = np.zeros((self._n, 3))
-        field[self.inner] = Factorization(self._B + sp.diags(w + 1e-9)).solve(w[:, None] * wishes[self.inner])
+        field[self.inner] = Factorization(self.smoothness + sp.diags(w + 1e-9)).solve(w[:, None] * wishes[self.inner])
         return field
 
 
-def paired_modes(vertices, faces, upper, lower, *, radius_mm=14.0):
-    """A function that gives, for a displacement field (n, 3), the correction after which paired points move alike."""
-    spread = SoftSpread(vertices, faces, np.concatenate([upper, lower[1:-1]]), radius=radius_mm)
-    a, b = upper[1:-1], lower[1:-1]
-    weights = np.zeros(len(vertices))
-    weights[a] = weights[b] = PIN
+def paired_modes(vertices, faces, upper, lower, *, radius_mm=14.0, touch_mm=0.5):
+    """A function that corrects displacement fields (n, 3) so that what touches in the neutral moves alike.
+
+    Minimises |M^-1/2 L u|^2 + sum over contacts w |(d + u)_i - (d + u)_opposite|^2 for the correction u of a field d.
+    Contacts are the seam's pairs and every lip vertex with the nearest point of the other lip, with a weight that
+    fades with their distance (touch_mm); else heads made of the modes would have crossing lips.
+    """
+    seam = np.concatenate([upper, lower[1:-1]])
+    spread = SoftSpread(vertices, faces, seam, radius=radius_mm)
+    C = _contacts(vertices, faces, upper, lower, touch_mm)
+    G = (C.T @ C).tocsr()
+    inner = spread.inner
+    factor = Factorization(spread.smoothness + G[inner][:, inner] + 1e-9 * sp.identity(len(inner)))
 
     def correction(field):
-        wishes = np.zeros_like(field)
-        wishes[a] = 0.5 * (field[b] - field[a])
-        wishes[b] = -wishes[a]
-        return spread(wishes, weights)
+        result = np.zeros_like(field)
+        result[inner] = factor.solve(-(G @ field)[inner])
+        return result
 
     return correction
+
+
+def _contacts(vertices, faces, upper, lower, touch_mm):
+    """Sparse (c, n): rows of differences between a point of one lip and its opposite on the other, weighted."""
+    n = len(vertices)
+    a, b = upper[1:-1], lower[1:-1]
+    k = len(a)
+    pairs = np.sqrt(PIN) * (
+        sp.csr_matrix((np.ones(k), (np.arange(k), a)), shape=(k, n))
+        - sp.csr_matrix((np.ones(k), (np.arange(k), b)), shape=(k, n))
+    )
+    blocks = [pairs]
+    sides = lip_sides(vertices, faces, upper, lower)
+    for mine, other in (sides, sides[::-1]):
+        patch = faces[other[faces].all(axis=1)]
+        index = np.flatnonzero(mine)
+        nearest = Surface(vertices, patch).closest(vertices[index])
+        weight = np.sqrt(PIN) * np.exp(-0.5 * (nearest.distance / touch_mm) ** 2)
+        rows = np.arange(len(index))
+        opposite = sp.csr_matrix(
+            (nearest.barycentric.ravel(), (np.repeat(rows, 3), patch[nearest.faces].ravel())), shape=(len(index), n)
+        )
+        own = sp.csr_matrix((np.ones(len(index)), (rows, index)), shape=(len(index), n))
+        blocks.append(sp.diags(weight) @ (own - opposite))
+    return sp.vstack(blocks).tocsr()
 
 
 def closed_lips(vertices, faces, upper, lower, *, radius_mm=14.0, gap_mm=0.04, rounds=6):
