@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import igl.predicates
 import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.evaluate.distances import on_border, sample_surface
 from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import face_cross, face_normals, vertex_normals
 from facewright.mesh.raster import Camera, RayScene
 
@@ -86,23 +86,6 @@ def torn_edges(neutral, moved, faces, mask=None, *, grow_mm=4.0, factor=3.0):
     rest = np.linalg.norm(neutral[edges[:, 0]] - neutral[edges[:, 1]], axis=1)
     now = np.linalg.norm(moved[edges[:, 0]] - moved[edges[:, 1]], axis=1)
     return edges[(now - rest > grow_mm) & (now > factor * rest)]
-
-
-def self_intersections(vertices, faces, mask=None):
-    """(k, 2) pairs of faces that cross and share no vertex, lower index first.
-
-    vertices (n, 3), faces (m, 3); mask (m,) bool limits both faces of a pair. Exact predicates; touching in a common
-    plane is not crossing.
-    """
-    chosen = np.arange(len(faces)) if mask is None else np.flatnonzero(mask)
-    subset = np.ascontiguousarray(faces[chosen], dtype=np.int64)
-    if not len(subset):
-        return np.empty((0, 2), np.int64)
-    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-    _, pairs, coplanar = igl.predicates.find_self_intersections(vertices, subset)
-    pairs = np.asarray(pairs).reshape(-1, 2)[np.asarray(coplanar).reshape(-1) == 0]
-    shared = (subset[pairs[:, 0]][:, :, None] == subset[pairs[:, 1]][:, None, :]).any(axis=(1, 2))
-    return np.unique(np.sort(chosen[pairs[~shared]], axis=1), axis=0)
 
 
 def new_self_intersections(vertices, reference, faces, among, region):

@@ -1,4 +1,4 @@
-"""What a template lacks, made by rule: eyes that turn, a tongue that comes out, lips that meet, even sides.
+"""What a template lacks, made by rule: eyes that turn, a tongue that comes out, even sides, round eyeballs.
 
 Every rule takes arrays and gives new ones; a description file switches it on (docs/template.md).
 """
@@ -6,46 +6,11 @@ Every rule takes arrays and gives new ones; a description file switches it on (d
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from facewright.conventions import mirrored_name
-from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass, uniform_laplacian
+from facewright.mesh.laplacian import cotangent_laplacian
 from facewright.solve.quadratic import Factorization
 from facewright.template.symmetry import mirrored_field
-
-
-class Spread:
-    """Carries displacements of a few handle vertices smoothly into their surroundings.
-
-    Minimises |M^-1/2 L u|^2 (biharmonic) with u given at handles and 0 farther than radius mm from them.
-
-    vertices (n, 3) mm, faces (m, 3), handles (k,) indices, free (n,) bool or None: vertices that may move at all
-    """
-
-    def __init__(self, vertices, faces, handles, radius, *, free=None):
-        n = len(vertices)
-        self.handles = np.asarray(handles)
-        near = cKDTree(vertices[self.handles]).query(vertices, distance_upper_bound=radius)[0] < radius
-        if free is not None:
-            near &= free
-        near[self.handles] = False
-        self.inner = np.flatnonzero(near)
-        L = cotangent_laplacian(vertices, faces)
-        mass = np.maximum(lumped_mass(vertices, faces), 1e-2)
-        B = (L @ sp.diags(1.0 / mass) @ L).tocsr()
-        # A breath of the graph Laplacian keeps slivers at the mouth corners from swinging.
-        B = B + 1e-4 * uniform_laplacian(faces, n)
-        self._cross = B[self.inner][:, self.handles]
-        self._factor = Factorization(B[self.inner][:, self.inner])
-        self._n = n
-
-    def __call__(self, displacements):
-        """(n, 3) field of displacements (k, 3) at the handles."""
-        field = np.zeros((self._n, 3))
-        field[self.handles] = displacements
-        field[self.inner] = self._factor.solve(-(self._cross @ displacements))
-        return field
 
 
 def symmetric_shapes(names, deltas, mirror):
