@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from facewright.data import Material, Mesh, Rig
-from facewright.parts.eyes import measure_eyeball
 from facewright.parts.fit import fit_skeleton
 from facewright.parts.iris import EyeLook, paint_eye
+from facewright.transfer.eyeball import measure_eyeball
 
 _STILL_MM = 1e-6
 SKIN_MAPS = ("albedo", "normal")

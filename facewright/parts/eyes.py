@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facewright.mesh.spread import spread_smoothly
+from facewright.transfer.eyeball import eye_parts, lid_clearance, measure_eyeball
 
 EYE_RADIUS_MM = 12.0
 RADIUS_LIMITS_MM = (11.0, 13.0)
-_LEAST_BULGE = 0.02  # of the radius: an eye that bulges less than this has no cornea
 _CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
 
 
@@ -32,70 +32,6 @@ class LidOptions:
     most_mm: float = 1.6
     reach_mm: float = 6.0
     rounds: int = 4
-
-
-@dataclass(frozen=True)
-class Eyeball:
-    """A ball with a cornea. center (3,) mm, radius of the sclera, axis (3,) unit through the pupil.
-
-    angles (a,) radians from the axis and radii (a,) mm there: the profile, round about the axis
-    """
-
-    center: np.ndarray
-    radius: float
-    axis: np.ndarray
-    angles: np.ndarray
-    radii: np.ndarray
-
-    def surface_radius(self, points):
-        """(k,) distance of the eye's surface from its centre in the direction of points (k, 3)."""
-        return np.interp(angle_from(self.axis, points - self.center), self.angles, self.radii)
-
-    def gap(self, points):
-        """(k,) mm from the surface to points, negative inside."""
-        return np.linalg.norm(points - self.center, axis=1) - self.surface_radius(points)
-
-    def pushed_to(self, points, gap):
-        """Points (k, 3) moved along the ray from the centre until they lie gap (k,) mm off the surface."""
-        offset = points - self.center
-        length = np.linalg.norm(offset, axis=1)
-        return self.center + offset * ((self.surface_radius(points) + gap) / length)[:, None]
-
-
-def angle_from(axis, directions):
-    """(k,) radians between a unit axis (3,) and directions (k, 3)."""
-    along = directions @ axis
-    across = np.linalg.norm(directions - along[:, None] * axis, axis=1)
-    return np.arctan2(across, along)
-
-
-def eye_parts(template, side):
-    """The parts that turn with an eye: the ball itself, and iris and cornea where they are separate."""
-    return [part for part in template.parts if part.attach == f"eye_{side}"]
-
-
-def measure_eyeball(template, side):
-    """The Eyeball of a template.
-
-    The radius is that of the ball's back half, where no cornea is. The axis goes through the middle of what bulges out
-    most, which is the cornea. The profile takes the outermost vertex of any of the eye's parts in each 3 degrees.
-    """
-    center = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
-    ball = template.vertices[template.part(f"eye_{side}").vertex_slice] - center
-    radius = float(np.median(np.linalg.norm(ball[ball[:, 2] < 0], axis=1)))
-    offset = np.concatenate([template.vertices[part.vertex_slice] for part in eye_parts(template, side)]) - center
-    distance = np.linalg.norm(offset, axis=1)
-    bulge = np.maximum(distance - radius, 0.0) * (offset[:, 2] > 0)
-    axis = (bulge**2) @ (offset / distance[:, None])
-    axis = axis / np.linalg.norm(axis) if bulge.max() > _LEAST_BULGE * radius else np.array([0.0, 0.0, 1.0])
-    angle = angle_from(axis, offset)
-    edges = np.radians(np.arange(0, 181, 3))
-    bins = np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2)
-    outermost = np.zeros(len(edges) - 1)
-    np.maximum.at(outermost, bins, distance)
-    seen = outermost > 0
-    middles = 0.5 * (edges[:-1] + edges[1:])
-    return Eyeball(center, radius, axis, middles[seen], np.maximum(outermost[seen], radius))
 
 
 def eye_radius(template, vertices, lines):
@@ -177,7 +113,8 @@ def fit_lids(template, vertices, regions, lines, side, ball, options=None):
     free = _lid_region(V, regions, part, side, ball)
     outer = (regions["eyes"][part.vertex_slice] & free) & ~regions[f"socket_{side}"][part.vertex_slice]
     handles, targets, held = _margin_targets(V, lines, side, ball, options)
-    clearance = _clearance(V, V[handles], outer, options)
+    clearance = np.full(len(V), 0.5 * options.gap_mm)
+    clearance[outer] = lid_clearance(V[outer], V[handles], options.gap_mm, options.skin_clear_mm)
     wanted = {int(i): t for i, t in zip(handles, targets)}
     moved = V
     for _ in range(options.rounds):
@@ -221,11 +158,3 @@ def _margin_targets(V, lines, side, ball, options):
         handles.append(keep)
         targets.append(V[keep] + step * np.minimum(1.0, options.most_mm / np.maximum(length, 1e-12)))
     return np.concatenate(handles), np.concatenate(targets), held
-
-
-def _clearance(V, margin, outer, options):
-    """(n_skin,) least gap to the ball: the margin's own inside the socket, growing with lid thickness outside."""
-    distance = np.sqrt(((V[outer][:, None] - margin[None]) ** 2).sum(axis=2)).min(axis=1)
-    clearance = np.full(len(V), 0.5 * options.gap_mm)
-    clearance[outer] = np.minimum(options.gap_mm + 0.3 * distance, options.skin_clear_mm)
-    return clearance

@@ -95,11 +95,12 @@ def _fit_mouth(template, vertices, parts, options):
     R, scale, t = best_similarity(template.vertices[skin], vertices[skin], weights, options.mouth_scale)
     placed = scale * rest @ R.T + t
     front = _front_teeth(template, parts)
-    allowed = _misplaced(template.vertices, template, rest[front]) + [options.poke_mm, options.show_share]
+    allowed = _Mouth(template, template.vertices).misplaced(rest[front]) + [options.poke_mm, options.show_share]
+    person = _Mouth(template, vertices)
     steps = np.arange(0.0, options.most_back_mm + 1e-9, 0.5)
     tried = []
     for back in steps:
-        tried.append(_misplaced(vertices, template, placed[front] - [0.0, 0.0, back]))
+        tried.append(person.misplaced(placed[front] - [0.0, 0.0, back]))
         if (tried[-1] <= allowed).all():
             break
     best = int(np.argmin([np.maximum(found - allowed, 0.0) @ [1.0, 20.0] for found in tried]))
@@ -118,18 +119,23 @@ def _front_teeth(template, parts):
     return teeth & (depth > depth[teeth].max() - _FRONT_TEETH_MM)
 
 
-def _misplaced(vertices, template, points):
-    """Depth in mm of the deepest of points (k, 3) inside the flesh, and the share of them that is seen from the front.
+class _Mouth:
+    """A head's skin, asked where teeth would stand. Flesh lies between the outer skin and the mouth bag, which are one
+    surface, closed but for the neck."""
 
-    Flesh lies between the outer skin and the mouth bag, which are one surface, closed but for the neck.
-    """
-    part = template.skin
-    V, F = vertices[part.vertex_slice], template.faces[part.face_slice]
-    inside = igl.fast_winding_number(np.ascontiguousarray(V), np.ascontiguousarray(F), np.ascontiguousarray(points))
-    inside = np.asarray(inside).reshape(-1) > 0.5
-    depth = Surface(V, F).closest(points[inside]).distance.max() if inside.any() else 0.0
-    seen = ~RayScene(V, F).occluded(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
-    return np.array([depth, seen.mean()])
+    def __init__(self, template, vertices):
+        part = template.skin
+        self.V = np.ascontiguousarray(vertices[part.vertex_slice])
+        self.F = np.ascontiguousarray(template.faces[part.face_slice])
+        self.surface, self.scene = Surface(self.V, self.F), RayScene(self.V, self.F)
+
+    def misplaced(self, points):
+        """Depth in mm of the deepest of points (k, 3) inside the flesh, and the share of them seen from the front."""
+        winding = igl.fast_winding_number(self.V, self.F, np.ascontiguousarray(points))
+        inside = np.asarray(winding).reshape(-1) > 0.5
+        depth = self.surface.closest(points[inside]).distance.max() if inside.any() else 0.0
+        seen = ~self.scene.occluded(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
+        return np.array([depth, seen.mean()])
 
 
 def _carried(template, vertices, part):

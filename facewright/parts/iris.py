@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 from facewright.mesh.closest import interpolate
 from facewright.mesh.raster import raster_uv
 from facewright.mesh.render import linear_to_srgb
-from facewright.parts.eyes import angle_from
+from facewright.transfer.eyeball import angle_from
 
 _DARK = 0.004  # linear: what is seen through a pupil
 

@@ -7,12 +7,13 @@ a second, small system that hangs on the moved skin and bones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from facewright.solve.procrustes import best_rotation, best_similarity
 from facewright.transfer.deformation import DeformationTransfer, Links
+from facewright.transfer.lids import ContactOptions, clear_lids
 
 CORRECTIVE_BASE = {"mouthClose": "jawOpen"}
 """Shapes that are made on top of another one and mean nothing without it."""
@@ -25,10 +26,12 @@ _RIGID_SKIN_MM = 2.0  # skin that strays by this from the jaw's rigid motion cou
 class TransferOptions:
     """w_lids  how firmly the two lid margins keep their relation (closing stays closing); 0: not at all
     w_lips  the same for the line where the lips meet
+    contact how lids are kept out of the eyeballs; None: not at all
     """
 
     w_lids: float = 5.0
     w_lips: float = 1.0
+    contact: ContactOptions | None = field(default_factory=ContactOptions)
 
 
 def transfer_shapes(face, options=None):
@@ -48,6 +51,8 @@ def transfer_shapes(face, options=None):
     result = np.zeros(template.deltas.shape)
     result[:, :stop] = _with_bases(skin, template.deltas[:, :stop], template.shape_names)
     _carry_bones(template, V, skin.rotation, result)
+    if options.contact is not None:
+        result = clear_lids(face, result, options.contact)
     _carry_the_rest(template, V, skin.rotation, result)
     return result
 

@@ -5,8 +5,8 @@ import pytest
 
 from facewright.conventions import ARKIT_SHAPES
 from facewright.parts import AssemblyOptions, build_rig, fit_parts
-from facewright.parts.eyes import measure_eyeball
 from facewright.parts.iris import EyeLook, eye_colors, paint_eye
+from facewright.transfer.eyeball import measure_eyeball
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,12 @@ import pytest
 
 from facewright.parts.eyes import (
     LidOptions,
-    angle_from,
     eye_radius,
     fit_lids,
-    measure_eyeball,
     moved_to,
     place_eyeball,
 )
+from facewright.transfer.eyeball import angle_from, measure_eyeball
 
 
 def inner_margin(V, lines, side):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from facewright.parts import fit_parts, fit_skeleton
-from facewright.parts.eyes import measure_eyeball
+from facewright.transfer.eyeball import measure_eyeball
 
 
 @pytest.fixture(scope="module")
