@@ -67,8 +67,9 @@ def fuse_sightings(subject, T, sightings, *, outlier_mm=3.0):
     weights = np.clip(sightings.facing - 0.05, 0.0, None)
     median = geometric_median(points, weights)
     distance = np.linalg.norm(points - median, axis=2)
-    typical = np.nanmedian(np.where(weights > 0, distance, np.nan), axis=0, keepdims=True) if weights.any() else 0.0
-    inlier = (weights > 0) & (distance <= np.maximum(outlier_mm, 2.0 * np.nan_to_num(typical)))
+    seen_at_all = weights.any(axis=0)
+    typical = np.nanmedian(np.where((weights > 0) | ~seen_at_all, distance, np.nan), axis=0)
+    inlier = (weights > 0) & (distance <= np.maximum(outlier_mm, 2.0 * typical))
     agreed = weights * inlier
     mean = _weighted_mean(points, agreed)
     spread = np.sqrt(_weighted_mean((points - mean) ** 2, agreed).sum(axis=1))
