@@ -41,7 +41,6 @@ def build_template(source_folder, description_path):
     mirror = mirror_map(vertices, shaped.polygons, groups=groups, twin_groups=twin_groups)
     vertices = symmetrized(vertices, mirror)
     names, deltas = _arkit(description, source_shapes, shaped.origin)
-    deltas = rules.symmetric_shapes(names, deltas, mirror)
     identity = _read_identity(folder, description, neutral.vertices, unit)[:, shaped.origin]
 
     head = _head(shaped, vertices, mirror)
@@ -54,9 +53,10 @@ def build_template(source_folder, description_path):
     regions = skin_regions(head, openness, loops, lines)
 
     deltas = _shape_rules(description, shaped, vertices, names, deltas, head, lines)
+    deltas = rules.symmetric_shapes(names, deltas, mirror)
     identity = _even_eyes(shaped, vertices, identity, head)
     regions = _whole_head(regions, len(vertices))
-    regions["skull"] = regions["outer"] & still_region(deltas, 0.05)
+    regions["skull"] = regions["outer"] & ~regions["face"] & still_region(deltas, 0.05)
     faces, _ = triangulated(shaped.polygons)
     uv_faces, _ = triangulated(shaped.uv_polygons)
     skeleton, skin_weights = head_skeleton(vertices, faces, shaped, deltas[names.index("jawOpen")], regions, head.eyes)
