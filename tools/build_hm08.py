@@ -12,13 +12,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from hm08.assemble import build_asset
-from hm08.licence import NOTICE
-from hm08.source import Source
-
 from facewright.errors import InputError
 from facewright.template.modifiers import write_modifiers
 from facewright.template.store import SHIPPED, write_template
+from hm08.assemble import build_asset
+from hm08.licence import NOTICE
+from hm08.source import Source
 
 
 def main():

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from facewright.conventions import ARKIT_SHAPES
+from facewright.conventions import ARKIT_SHAPES, mirrored_name
 from facewright.data import Part, Template
 from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.openness import vertex_openness
+from facewright.mesh.polygons import triangulated
 from facewright.template.landmarks import template_landmarks
 from facewright.template.modifiers import Modifiers, build_modes, mean_weights
 from hm08.carry import Carrier
@@ -56,8 +57,6 @@ class Assembly:
 
     def add(self, name, vertices, polygons, uv, uv_polygons, mirror, material, attach):
         """One part with its own indices; mirror counts from the part's first vertex."""
-        from facewright.mesh.polygons import triangulated
-
         start, uv_start = self._count(self.vertices), self._count(self.uv)
         face_start = self._count(self.faces)
         faces, uv_faces = triangulated(polygons)[0], triangulated(uv_polygons)[0]
@@ -94,8 +93,8 @@ def build_asset(source, *, say=lambda text: None):
         ear = np.maximum(ear, np.linalg.norm(delta, axis=1) > 0.3)
     regions = skin_regions(head, control, ear)
     say("atlas")
-    uv, uv_faces, _ = build_atlas(head.V, head.F, head.mirror, regions)
-    assembly = _assemble(control, head, uv, uv_faces)
+    uv, uv_polygons, _ = build_atlas(head.V, head.polygons, head.mirror, regions, head.V_open)
+    assembly = _assemble(control, head, uv, uv_polygons)
     say("shapes")
     raw = read_face_units(source, n_base, ARKIT_SHAPES)[:, control.original] * control.scale
     skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions)
@@ -117,9 +116,8 @@ def build_asset(source, *, say=lambda text: None):
     return Asset(template, {"operator": operator, "identity": modes}, modifiers)
 
 
-def _assemble(control, head, uv, uv_faces):
+def _assemble(control, head, uv, uv_polygons):
     assembly = Assembly()
-    uv_polygons = _like(head.polygons, head.F, uv_faces)
     assembly.add("skin", head.V, head.polygons, uv, uv_polygons, head.mirror, "skin", "skin")
     eyes = eye_pair(head.eye_center)
     k = len(eyes["eye_left"][0])
@@ -128,20 +126,10 @@ def _assemble(control, head, uv, uv_faces):
         assembly.add(name, vertices, polygons, eye_uv, polygons, np.arange(k) + side * k, "eye", name)
     for name, attach in ATTACH.items():
         vertices, polygons, mirror, _ = simple_part(control, name)
-        part_uv, part_polygons = unwrap_part(vertices, polygons)
+        part_uv = unwrap_part(vertices, polygons)
         material = "tongue" if name == "tongue" else "teeth"
-        assembly.add(name, vertices, polygons, part_uv, part_polygons, mirror, material, attach)
+        assembly.add(name, vertices, polygons, part_uv, polygons, mirror, material, attach)
     return assembly
-
-
-def _like(polygons, F, uv_faces):
-    """(p, 4) uv indices in the order of the polygons' corners, from those of their triangles."""
-    quad = polygons[:, 3] >= 0
-    first = np.concatenate([[0], np.cumsum(np.where(quad, 2, 1))[:-1]])
-    out = np.full(polygons.shape, -1)
-    out[:, :3] = uv_faces[first]
-    out[quad, 3] = uv_faces[first[quad] + 1, 2]
-    return out
 
 
 def _with_parts(skin, raw, control, head, assembly):
@@ -157,7 +145,7 @@ def _with_parts(skin, raw, control, head, assembly):
         i = ARKIT_SHAPES.index(name)
         flip = np.array([-1.0, 1.0, 1.0])
         own = raw[i][index["teeth_lower"]]
-        other = raw[ARKIT_SHAPES.index(_other(name))][control.mirror[index["teeth_lower"]]] * flip
+        other = raw[ARKIT_SHAPES.index(mirrored_name(name))][control.mirror[index["teeth_lower"]]] * flip
         R, t = rigid_motion(teeth, teeth + 0.5 * (own + other))
         if name == "jawOpen":
             jaw = (R, t)
@@ -176,14 +164,8 @@ def _with_parts(skin, raw, control, head, assembly):
     return deltas, jaw
 
 
-def _other(name):
-    from facewright.conventions import mirrored_name
-
-    return mirrored_name(name)
-
-
 def _carried(names, deltas, macros, control, head):
-    """All names and (k, c + 2, 3) control deltas that keep lips closed, lids on the balls and the eyes at the origin."""
+    """All names and (k, c + 2, 3) control deltas; lips stay closed, lids on the balls, the eyes at the origin."""
     carrier = Carrier(control, head)
     fields, kept = [], []
     for name, delta in [*zip(names, deltas), *sorted(macros.items())]:
@@ -247,5 +229,3 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
         materials=MATERIALS,
         info={"name": "hm08", "version": "1", "licence": "CC0-1.0", "credits": CREDITS, "copyright": CREDITS},
     )
-
-

@@ -8,12 +8,15 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from facewright.mesh.normals import normalized
 from facewright.solve.quadratic import Factorization
 from hm08.density import SEAM_RING
-from hm08.neutral import EYE_RADIUS_MM, LID_GAP_MM
+from hm08.eyeball import height_above
+from hm08.neutral import LID_GAP_MM, inside_faces
 from hm08.spread import bilaplacian, spread
 
 SEAM_WEIGHT = 1e4
+NOSE_RADIUS_MM = 22.0
 NEAR_BALL_MM = 1.0  # margin points that stand off further than this follow the lids' own corner
 
 
@@ -30,12 +33,12 @@ class Carrier:
         V = control.vertices[:n]
         F = np.concatenate([control.quads[:, [0, 1, 2]], control.quads[:, [0, 2, 3]]])
         self.K = bilaplacian(V, F)
+        self.nostrils = carry_nostrils(control)
         self.center = head.eye_center
         self.margin = np.array(control.eye_left.rings[0])
-        offset = head.V[[head.grid["eye_left"][(0, 4 * i)] for i in range(len(self.margin))]] - self.center
-        distance = np.linalg.norm(offset, axis=1)
-        self.normal = offset / distance[:, None]
-        stands_off = distance - EYE_RADIUS_MM - LID_GAP_MM
+        fine = head.V[[head.grid["eye_left"][(0, 4 * i)] for i in range(len(self.margin))]]
+        self.normal = normalized(fine - self.center)
+        stands_off = height_above(fine, self.center) - LID_GAP_MM
         self.on_ball = np.exp(-((np.maximum(stands_off, 0.0) / NEAR_BALL_MM) ** 2))
         self.around_eye = np.linalg.norm(V - self.center, axis=1) < 26.0
         mouth = V[control.mouth.rings[SEAM_RING]].mean(axis=0)
@@ -51,7 +54,7 @@ class Carrier:
 
     def __call__(self, delta):
         """(c + 2, 3) control deltas (skin, teeth, tongue, eye_left, eye_right) of a raw (c, 3) one."""
-        skin = self.close_lips(delta[: self.n_skin])
+        skin = self.close_lips(self.nostrils @ delta[: self.n_skin])
         eyes = []
         for side in (1, -1):
             flip = np.array([side, 1.0, 1.0])
@@ -79,3 +82,59 @@ class Carrier:
         out = skin.copy()
         out[self.around_mouth] -= self.lips.solve(SEAM_WEIGHT * (self.seam_local.T @ open_by))
         return out
+
+
+def carry_nostrils(control):
+    """(c_skin, c_skin) operator that gives the insides of the nostrils the motion of the nose around them.
+
+    The passages are deeper than hm08's pits, so the pits' own deltas do not fit them: a nose that shrinks would leave
+    them standing through its side. Inside, a delta becomes the affine map fitted to the skin around the nostril, plus
+    what the rim does beyond that, fading with depth.
+    """
+    n = control.n_skin
+    V, mirror = control.vertices[:n], control.mirror[:n]
+    rings = control.nostril_left.rings
+    rim = np.array(rings[1])
+    inside = nostril_inside(control)
+    taken = np.zeros(n, bool)
+    taken[inside] = taken[mirror[inside]] = True
+    center = V[rim].mean(axis=0)
+    distance = np.linalg.norm(V - center, axis=1)
+    near = np.flatnonzero((distance < NOSE_RADIUS_MM) & ~taken & (V[:, 0] > -2.0) & (V[:, 2] > 10.0))
+    w = np.exp(-((distance[near] / (0.6 * NOSE_RADIUS_MM)) ** 2))
+    design = np.concatenate([V[near] - center, np.ones((len(near), 1))], axis=1)
+    fit = np.linalg.solve(design.T @ (w[:, None] * design) + 1e-3 * np.eye(4), design.T * w)
+    rows = np.zeros((len(inside), n))
+    at = np.concatenate([V[inside] - center, np.ones((len(inside), 1))], axis=1)
+    rows[:, near] = at @ fit
+    depth = np.linalg.norm(V[inside][:, None] - V[rim][None], axis=2)
+    share = np.exp(-((depth / 3.0) ** 2)) + 1e-12
+    fade = np.exp(-((depth.min(axis=1) / 5.0) ** 2))
+    share = share / share.sum(axis=1, keepdims=True) * fade[:, None]
+    residual = np.zeros((len(rim), n))
+    residual[np.arange(len(rim)), rim] = 1.0
+    residual[:, near] -= np.concatenate([V[rim] - center, np.ones((len(rim), 1))], axis=1) @ fit
+    rows += share @ residual
+    return _both_sides(rows, inside, mirror)
+
+
+def _both_sides(rows, inside, mirror):
+    """The identity with rows (k, n) at the left inside vertices and their images at the right ones; components of x
+    need no sign here: the operator acts on each component of a delta alike, and mirroring commutes with it."""
+    n = len(mirror)
+    keep = np.ones(n, bool)
+    keep[inside] = keep[mirror[inside]] = False
+    left = sp.csr_matrix(rows)
+    right = sp.csr_matrix(rows[:, mirror])
+    place = sp.csr_matrix((np.ones(len(inside)), (inside, np.arange(len(inside)))), shape=(n, len(inside)))
+    place_right = sp.csr_matrix(
+        (np.ones(len(inside)), (mirror[inside], np.arange(len(inside)))), shape=(n, len(inside))
+    )
+    return (sp.diags(keep.astype(float)) + place @ left + place_right @ right).tocsr()
+
+
+def nostril_inside(control):
+    """(k,) control vertices of the left nostril deeper than its rim."""
+    rings = control.nostril_left.rings
+    blind_end = set(control.quads[inside_faces(control)].ravel().tolist())
+    return np.array(sorted(blind_end | set(rings[0]) | set(rings[-1]) | set(rings[-2])))

@@ -16,7 +16,6 @@ NECK_EDGE = (797, 7508)  # the head group's own border loop
 COLLAR_RINGS = 3  # strips kept below it
 NOSE_TIP = 302
 MOUTH_EDGE = (540, 7279)  # the loop around the opening, from the middle of the lower lip to the left
-MOUTH_INSIDE = 20  # rings into the mouth bag: as many as the grid has
 EYE_MARGIN_EDGE = (7747, 7748)  # the narrowest loop between the lids
 NOSTRIL_EDGE = (7089, 7090)  # the rim of the left nostril
 INTERPUPILLARY_MM = 62.5
@@ -38,7 +37,7 @@ class Control:
     vertices (c, 3) mm in our frame; quads (m, 4) of the skin; mirror (c,); original (c,) hm08 index of each vertex
     n_skin   skin vertices come first, then teeth_upper, teeth_lower, tongue
     part_quads  name -> (k, 4) for the simple parts
-    mouth, eye_left, nostril_left  Grids; scale  mm here per mm of the file; center (3,) file mm of our origin
+    mouth, eye_left, nostril_left  Grids; joints name -> (3,); scale  mm here per mm of the file
     """
 
     vertices: np.ndarray
@@ -94,7 +93,7 @@ def _cut(topology):
     """(m,) bool: faces of the head above the collar."""
     loop = topology.edge_loop(*NECK_EDGE)
     head = topology.side_of_loop(loop, NOSE_TIP)
-    rings, strips = topology.rings(loop, head, 0, COLLAR_RINGS)
+    _, strips = topology.rings(loop, head, 0, COLLAR_RINGS)
     kept = head.copy()
     for strip in strips.values():
         kept[strip] = True

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from hm08.subdivide import adaptive, balanced, catmull_clark
+from hm08.topology import QuadTopology
 
 MOUTH_COLUMNS = 38
 OLD_CORNER, NEW_CORNER = 7.6, 9.5
@@ -169,6 +170,7 @@ def wished_edge(P, control):
     near_mouth = np.hypot(x, y - mouth[1]) < 42
     brow = (np.abs(y - 17) < 16) & (x < 55) & (z > -15)
     wish = np.where(near_mouth | brow, 2.0, wish)
+    wish = np.where((x < 16) & (y > 10) & (y < 66) & (z > 0), 1.9, wish)  # hm08's own quads are smaller there
     band = (x > 10) & (x < 46) & (y < -25) & (y > -85) & (z > -5)  # the nasolabial fold
     return np.where(band, 1.8, wish), front & (x < 70)
 
@@ -213,8 +215,6 @@ def _without_fray(marked, quads):
 
 def _beyond(control):
     """(m,) bool: quads deeper in the mouth bag or an eye socket than their grids reach."""
-    from hm08.topology import QuadTopology
-
     topology = QuadTopology(control.quads)
     deep = np.zeros(len(control.quads), bool)
     for grid in (control.mouth, control.eye_left):

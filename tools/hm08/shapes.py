@@ -12,8 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from facewright.conventions import ARKIT_SHAPES, mirrored_name
+from facewright.mesh.laplacian import lumped_mass
 from facewright.solve.quadratic import Factorization
-from hm08.neutral import EYE_RADIUS_MM, LID_GAP_MM
+from hm08.carry import carry_nostrils
+from hm08.eyeball import at_height, height_above
+from hm08.neutral import LID_GAP_MM
 from hm08.regions import geodesic
 from hm08.spread import bilaplacian, spread
 
@@ -74,8 +77,6 @@ class Fairing:
     """Takes the short waves out of delta fields: (M + FAIR^4 K) u = M d, seam and lid lines keeping their own."""
 
     def __init__(self, head):
-        from facewright.mesh.laplacian import lumped_mass
-
         self.mass = sp.diags(lumped_mass(head.V, head.F))
         self.system = Factorization((self.mass + FAIR_MM**4 / 16 * head.K).tocsr())
 
@@ -87,12 +88,13 @@ def build_shapes(raw, control, head, regions):
     """(52, n, 3) deltas of the skin from raw (52, c_skin, 3) control deltas."""
     masks = build_masks(head, regions)
     fair = Fairing(head)
+    nostrils = carry_nostrils(control)
     out = np.zeros((len(ARKIT_SHAPES), len(head.V), 3))
     for i, (name, delta) in enumerate(zip(ARKIT_SHAPES, symmetrised(raw, control.mirror[: control.n_skin]))):
         if name.endswith("Right"):
             continue
         mask = getattr(masks, family(name))
-        fine = fair(head.S @ delta) * mask[:, None]
+        fine = fair(head.S @ (nostrils @ delta)) * mask[:, None]
         if name == "eyeBlinkLeft":
             fine = just_closing(head, fine)
         out[i] = fine
@@ -128,14 +130,12 @@ def lid_opening(V, upper, lower):
 
 def outside_ball(head, V):
     """(n, 3) what lifts the lids of V off the left ball, spread over their neighbourhood."""
-    offset = V - head.eye_center
-    distance = np.linalg.norm(offset, axis=1)
     near = np.linalg.norm(head.V - head.eye_center, axis=1) < 30
-    deep = near & (distance < EYE_RADIUS_MM + LID_GAP_MM) & (offset[:, 2] > 0)
+    deep = near & (height_above(V, head.eye_center) < LID_GAP_MM) & (V[:, 2] > head.eye_center[2])
     if not deep.any():
         return np.zeros_like(V)
     handles = np.flatnonzero(deep)
-    values = offset[handles] / distance[handles, None] * (EYE_RADIUS_MM + LID_GAP_MM - distance[handles])[:, None]
+    values = at_height(V[handles], head.eye_center, LID_GAP_MM) - V[handles]
     return spread(bilaplacian(head.V, head.F), handles, values, ~near)
 
 

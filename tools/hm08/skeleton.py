@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from facewright.data import Skeleton
 from facewright.mesh.laplacian import lumped_mass
 from facewright.solve.quadratic import Factorization
+from hm08.regions import geodesic
 
 NAMES = ("neck", "head", "jaw", "eye_left", "eye_right")
 PARENTS = (-1, 0, 1, 1, 1)
@@ -51,7 +52,5 @@ def skin_weights(head, regions, jaw_open, R, t):
 
 
 def _grown(mask, head):
-    from hm08.regions import geodesic
-
     distance = geodesic(head.V, head.F, np.flatnonzero(mask))
     return np.clip(1.0 - distance / 20.0, 0.0, 1.0)

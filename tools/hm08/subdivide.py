@@ -167,4 +167,3 @@ def triangulate(polygons, V, mirror):
     triangles = np.concatenate([polygons[:, [0, 1, 2]], polygons[quad][:, [0, 2, 3]]])
     order = np.concatenate([np.arange(len(polygons)) * 2, np.nonzero(quad)[0] * 2 + 1])
     return triangles[np.argsort(order, kind="stable")], polygons
-
