@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from facewright import __version__
-from facewright.bake import BakeOptions, bake
+from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
@@ -19,7 +19,8 @@ from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face
 from facewright.parts import build_rig, fit_parts
 from facewright.read import read_scan
 from facewright.register import RegisterOptions, register
-from facewright.scan import PoseOptions, clean_scan, find_landmarks
+from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
+from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
 from facewright.transfer import transfer_shapes
 from facewright.write.gltf import write_gltf
@@ -151,7 +152,7 @@ def _run_job(path, out, options, inputs, folder, progress):
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     run.tell("03-register", "reading the template")
     template = read_template(folder)
-    face = _register(run, scan, landmarks, template, folder, options)
+    face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, face, template)
     deltas = _transfer(run, face, template)
     maps = _bake(run, scan, face, options)
@@ -183,25 +184,32 @@ def _read(run, path, options, inputs):
 
 
 def _landmarks(run, scan, options, inputs):
+    placed = read_landmarks(options.landmarks) if options.landmarks else {}
+
     def work():
-        pose = find_landmarks(
-            scan,
-            PoseOptions(up=options.up, units=options.units, mirror=options.mirror, landmarks=options.landmarks),
-        )
-        arrays, info = pack_scan(pose.scan)
-        marks, names = pack_landmarks(pose.landmarks)
-        return arrays | marks, info | names | {"pose": pose.info}
+        found = find_landmarks(scan, LandmarkOptions(options.up, options.units, options.mirror, placed))
+        arrays, info = pack_scan(found.scan)
+        marks, names = pack_landmarks(found.landmarks)
+        pose = {
+            "unit_mm": found.unit_mm,
+            "unit_source": found.unit_source,
+            "uv_flipped": found.uv_flipped,
+            "notes": list(found.warnings),
+            "placed": [f"mp{landmark_index(name)}" for name in placed],
+            **found.stats,
+        }
+        return arrays | marks, info | names | {"pose": pose}
 
     depends = [options.up, options.units, options.mirror, inputs["landmarks"]]
     arrays, info = run.stage("02-landmarks", work, depends)
     return unpack_scan(arrays, info), unpack_landmarks(arrays, info), info["pose"]
 
 
-def _register(run, scan, landmarks, template, folder, options):
+def _register(run, scan, landmarks, placed, template, folder, options):
     register_options = RegisterOptions(eyes=options.eyes)
 
     def work():
-        return pack_face(register(scan, landmarks, template, register_options))
+        return pack_face(register(scan, landmarks, template, register_options, placed))
 
     template_key = [file_digest(folder / name) for name in ("template.toml", "arrays.npz")]
     arrays, info = run.stage("03-register", work, asdict(register_options), template_key)
@@ -228,7 +236,7 @@ def _bake(run, scan, face, options):
     bake_options = BakeOptions(size=options.texture_size)
 
     def work():
-        return bake(scan, face, bake_options), {}
+        return bake(scan, face, bake_options, options.jobs), {}
 
     arrays, _ = run.stage("06-bake", work, asdict(bake_options))
     return arrays
@@ -240,8 +248,8 @@ def _write(rig, maps, scan, face, out, options):
     if "obj" in options.formats:
         write_obj(rig, out / "obj")
     write_rig(rig, out / "rig")
-    write_textures(maps, out / "textures", rig)
-    write_preview(rig, scan, face, out / "preview.png")
+    write_textures(maps, out / "textures", describe_maps(face, maps))
+    write_preview(rig, scan, face, out / "preview.png", options.jobs)
 
 
 def _rig_to_scan(scan):
@@ -263,7 +271,9 @@ def _input_digests(path, options) -> dict[str, Any]:
             raise InputError(f"{what}: cannot read {file}: {error.strerror}; check the path") from error
     # What an OBJ names (materials, images) lies beside it: its own bytes do not change when they do.
     beside = sorted(Path(path).parent.glob("*")) if Path(path).suffix.lower() in (".obj", ".gltf") else []
-    named = [file for file in beside if file.suffix.lower() in (".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".bin")]
+    named = [
+        file for file in beside if file.suffix.lower() in (".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".bin")
+    ]
     digests["scan"] = [digests["scan"], digests["albedo"], digests["normal_map"]]
     digests["scan"] += [[file.name, file_digest(file)] for file in named if file.is_file()]
     return digests

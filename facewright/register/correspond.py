@@ -16,7 +16,7 @@ from facewright.mesh.normals import face_areas, face_normals, vertex_normals
 class Matches:
     """For k template points: points (k, 3) on the scan, its normals (k, 3), weights (k,) in 0..1, distance (k,) mm.
 
-    roughness (k,) degrees, see roughness_deg
+    roughness (k,) relative to the scan's skin, see Target.compare_roughness
     """
 
     points: np.ndarray
@@ -26,7 +26,7 @@ class Matches:
     roughness: np.ndarray
 
 
-def roughness_deg(vertices, faces, radius_mm=6.0, count=40000, neighbours=24):
+def roughness_deg(vertices, faces, radius_mm=9.0, count=40000, neighbours=40):
     """(n,) how far the surface's normals scatter within radius_mm: skin 4 to 12 degrees, hair and cloth 20 to 40.
 
     Where the mesh is flat over large faces too few samples lie near; it counts as smooth.
@@ -53,8 +53,15 @@ class Target:
         self.vertices, self.faces = self.surface.vertices, self.surface.faces
         self.normals = vertex_normals(self.vertices, self.faces)
         self.border = border_vertices(self.faces, len(self.vertices))
-        self.roughness = roughness_deg(self.vertices, self.faces)
+        self.roughness = np.ones(len(self.vertices))
         self.openness = np.ones(len(self.vertices)) if openness is None else np.asarray(openness)
+
+    def compare_roughness(self, skin_points):
+        """Set self.roughness (n,) relative to the scan's skin, known to lie near skin_points (k, 3)."""
+        degrees = roughness_deg(self.vertices, self.faces)
+        skin = self.surface.closest(skin_points)
+        typical = np.median(interpolate(degrees, self.faces, skin.faces, skin.barycentric))
+        self.roughness = degrees / max(float(typical), 3.0)
 
     def match(self, points, normals, *, max_distance, max_angle_deg=60.0, tau=None):
         """Matches of template points (k, 3) with outward normals (k, 3).

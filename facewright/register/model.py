@@ -53,16 +53,15 @@ class Expressions:
     std: np.ndarray
 
 
-def fit_model(
-    mean, basis, expressions, faces, weights, target, landmark_points, landmark_rows, landmark_weights, options
-):
+def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks, options):
     """Fit the model to a scan.
 
     mean (n, 3), basis (i, n, 3) one standard deviation each, expressions Expressions, faces (m, 3)
-    weights (n,) trust in each vertex, 0 leaves it out; target: correspond.Target
-    landmark_points (l, 3) on the scan; landmark_rows: scipy sparse (l, n) that takes template vertices to landmarks
+    weights (n,) trust in each vertex, 0 leaves it out; rules: skin.SkinRules; target: correspond.Target
+    landmarks: points (l, 3) on the scan, scipy sparse (l, n) that takes template vertices to them, weights (l,)
     returns ModelFit
     """
+    landmark_points, landmark_rows, landmark_weights = landmarks
     state = _State(mean, basis, expressions)
     deltas = expressions.deltas
     sampled = _sample_rows(mean, faces, weights)
@@ -81,7 +80,11 @@ def fit_model(
         jacobian = state.jacobian(mean[sampled], basis[:, sampled], deltas[:, sampled])  # (k, 3, p)
         rows = np.einsum("kc,kcp->kp", matches.normals, jacobian)
         residuals = np.einsum("kc,kc->k", matches.normals, vertices[sampled] - matches.points)
-        surface = (rows, residuals, areas * matches.weights / options.sigma_mm**2)
+        height = np.einsum("kc,kc->k", normals[sampled], matches.points - vertices[sampled])
+        # Heights mean little while the model is still far off.
+        height = height if progress > 0.5 else np.zeros_like(height)
+        belief = matches.weights * rules.believe(sampled[:, None], height, matches.roughness)
+        surface = (rows, residuals, areas * belief / options.sigma_mm**2)
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         fading = (1 - progress) ** 2 + 0.05
         landmarks = (rows, residuals, fading * row_weights / options.landmark_sigma_mm**2)

@@ -17,23 +17,16 @@ from facewright.register.lines import DEEP_MM, CreaseOptions, arc_fractions, tra
 from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
 from facewright.register.nonrigid import Rows
-from facewright.register.skin import contact_rows, fit_skin, line_rows, skin_rules
+from facewright.register.skin import contact_rows, fit_skin, line_rows, skin_rules, without_hair
 from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, LIPS_INNER, LIPS_OUTER, NOSE
 
-REST_SHAPES = [
-    "mouthSmileLeft",
-    "mouthSmileRight",
-    "mouthFrownLeft",
-    "mouthFrownRight",
-    "mouthPressLeft",
-    "mouthPressRight",
-    "browInnerUp",
-    "browDownLeft",
-    "browDownRight",
-]
+# One slight smile is all the expression that is looked for on open-eyed rest faces: frowns, presses and brows, tried on
+# heads with known truth, were mostly identity (lips 2.5 mm off with them, 1.1 without).
+SMILE = ("mouthSmileLeft", "mouthSmileRight")
 SIDES = {"left": "Left", "right": "Right"}
-# How far a neutral face's shapes stray from rest, and shut lids from the template's blink.
-REST_STD, SHUT_STD = 0.12, 0.15
+# How far a smile strays from rest, and shut lids from the template's blink.
+SMILE_STD, SHUT_STD = 0.1, 0.15
+SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
 LID_LANDMARKS = {
     "left": (362, 382, 381, 380, 374, 373, 390, 249, 263),
     "right": (133, 155, 154, 153, 145, 144, 163, 7, 33),
@@ -54,7 +47,7 @@ class RegisterOptions:
 # (w_bend, w_stretch, tau mm, reach mm) per level; tuned on heads with known truth (bench/registration_truth.py):
 # lower final stiffness gains distance and loses correspondence, so the last levels only take up the scan's detail.
 LEVELS = tuple((w, w / 5, 3.0, 10.0) for w in (100.0, 45.0, 20.0, 10.0, 5.0))
-DETAIL = ((1.0, 0.2, 1.5, 4.0), (0.2, 0.05, 1.0, 3.0))
+DETAIL = ((2.0, 0.4, 1.5, 4.0),)
 
 
 def register(scan, landmarks, template, options=None, placed=()):
@@ -68,18 +61,20 @@ def register(scan, landmarks, template, options=None, placed=()):
     """
     options = options or RegisterOptions()
     target = Target(scan.vertices, scan.faces, vertex_openness(scan.vertices, scan.faces))
+    smooth = [landmarks.names.index(f"mp{i}") for i in SMOOTH_LANDMARKS]
+    target.compare_roughness(landmarks.positions(scan.vertices, scan.faces)[smooth])
     pairs = _landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
     model, names = _fit_model(template, target, pairs, closed, options.model)
     lines, leading, line_stats = _leading_lines(scan, template, model, pairs, closed)
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
-    rules = skin_rules(template)
+    rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
     interior, outer = _interior(template)
     fit = model.vertices.copy()
     fit[:stop] = tuck_interior(skin, faces, interior, outer)
-    expression = dict(zip(names, np.round(model.expression, 4).tolist()))
+    expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
         rest, removed = take_out_expression(template, model, fit[:stop], expression)
@@ -89,6 +84,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
+        "bald": bald,
         "model_rms_mm": model.rms,
         "identity_std": float(np.sqrt(np.mean(model.alpha**2))) if len(model.alpha) else 0.0,
         "landmarks_used": len(pairs.names),
@@ -173,31 +169,31 @@ def eyes_closed(pairs):
 
 
 def _expressions(template, closed):
-    """What the scan may wear: lids shut where they were found shut, and a little of each rest shape."""
-    lids = [f"eyeBlink{SIDES[side]}" for side in SIDES if closed[side]]
-    names = [*REST_SHAPES, *lids]
-    deltas = np.stack([template.shape(name) for name in names])
-    rest, shut = len(REST_SHAPES), len(lids)
-    expected = np.concatenate([np.zeros(rest), np.full(shut, 0.9)])
-    return names, Expressions(deltas, expected, np.concatenate([np.full(rest, REST_STD), np.full(shut, SHUT_STD)]))
+    """What the scan may wear: lids shut where they were found shut, and a slight smile. Tuples of shapes, and deltas."""
+    lids = [(f"eyeBlink{SIDES[side]}",) for side in SIDES if closed[side]]
+    names = [SMILE, *lids]
+    deltas = np.stack([sum(template.shape(name) for name in together) for together in names])
+    expected = np.array([0.0] + [0.9] * len(lids))
+    return names, Expressions(deltas, expected, np.array([SMILE_STD] + [SHUT_STD] * len(lids)))
 
 
 def _fit_model(template, target, pairs, closed, options):
     names, expressions = _expressions(template, closed)
     stop = template.skin.vertices[1]
+    rules = skin_rules(template)
     trust = np.zeros(len(template.vertices))
-    trust[:stop] = skin_rules(template).trust
+    trust[:stop] = rules.trust
     trust[~template.regions["face"]] *= 0.3
+    trust[template.regions["scalp"]] = 0.0  # it may be hair
     model = fit_model(
         template.vertices,
         template.identity_basis,
         expressions,
         template.faces[template.skin.face_slice],
         trust,
+        rules,
         target,
-        pairs.points,
-        pairs.rows,
-        pairs.weights,
+        (pairs.points, pairs.rows, pairs.weights),
         options,
     )
     return model, names

@@ -22,9 +22,10 @@ REGION_RULES = {
     "ear_left": (5.0, 5.0, 8.0, 0.3),
     "ear_right": (5.0, 5.0, 8.0, 0.3),
 }
-# Hair may begin this far from eyes, lips and nostrils; there rough surface is not believed (degrees: skin, hair).
+# Hair may begin this far from eyes, lips and nostrils.
 HAIR_FROM_MM = 32.0
-SKIN_DEG, HAIR_DEG = 12.0, 20.0
+# Rough surface there is not believed: hair and cloth scatter the normals this much more than the same scan's skin.
+SKIN_RATIO, HAIR_RATIO = 1.2, 1.5
 
 
 @dataclass(frozen=True)
@@ -37,15 +38,15 @@ class SkinRules:
     outward: np.ndarray
     hairy: np.ndarray
 
-    def believe(self, rows, barycentric, height, roughness):
-        """(k,) factor in 0..1 for data at faces' corners rows (k, 3): hair, cloth and holes are not believed.
+    def believe(self, rows, height, roughness):
+        """(k,) factor in 0..1 for data at vertices rows (k, c): hair, cloth and holes are not believed.
 
-        height (k,) mm of the scan above the template there, roughness (k,) degrees
+        height (k,) mm of the scan above the template there, roughness (k,) relative to the scan's skin; with several
+        vertices a row (a face's corners) the strictest counts
         """
-        at = lambda values: np.einsum("kc,kc->k", values[rows], barycentric)  # noqa: E731
-        smooth = np.clip((HAIR_DEG - roughness) / (HAIR_DEG - SKIN_DEG), 0.0, 1.0)
+        smooth = np.clip((HAIR_RATIO - roughness) / (HAIR_RATIO - SKIN_RATIO), 0.0, 1.0)
         inside = (height <= self.outward[rows].min(axis=1)) & (height >= -self.inward[rows].min(axis=1))
-        return inside * np.where(at(self.hairy.astype(float)) > 0.5, smooth, 1.0)
+        return inside * np.where(self.hairy[rows].any(axis=1), smooth, 1.0)
 
 
 def skin_rules(template):
@@ -70,6 +71,21 @@ def skin_rules(template):
     hairy = regions["outer"] & away & (above | ~regions["face"])
     outward[hairy & regions["face"]] = 5.0
     return SkinRules(trust, stiffness, inward, outward, hairy)
+
+
+def without_hair(rules, template, vertices, target):
+    """(SkinRules, bald): the scalp's data are believed only on a head whose scalp is as smooth as its skin.
+
+    Hair lies close to the head and a few millimetres over it: where it is combed no vertex of it looks wrong by itself,
+    and a scalp that follows it drags the forehead up by 5 mm. vertices (n, 3): the model fitted to the face.
+    """
+    stop = template.skin.vertices[1]
+    scalp = template.regions["scalp"][:stop] & template.regions["outer"][:stop]
+    normals = vertex_normals(vertices[:stop], template.faces[template.skin.face_slice])
+    found = target.match(vertices[:stop][scalp], normals[scalp], max_distance=15.0)
+    seen = found.weights > 0
+    bald = bool(seen.mean() > 0.3 and np.median(found.roughness[seen]) < SKIN_RATIO)
+    return (rules if bald else replace(rules, trust=np.where(scalp, 0.0, rules.trust))), bald
 
 
 def line_rows(line, points, weights, n):
@@ -126,9 +142,8 @@ def fit_skin(start, faces, target, rules, leading, levels, samples=20000):
 def _matches(target, vertices, normals, rules, reach, tau):
     found = target.match(vertices, normals, max_distance=reach, tau=tau)
     height = np.einsum("kc,kc->k", normals, found.points - vertices)
-    itself = np.repeat(np.arange(len(vertices))[:, None], 3, axis=1)
-    third = np.full((len(vertices), 3), 1 / 3)
-    weights = found.weights * rules.trust * rules.believe(itself, third, height, found.roughness)
+    itself = np.arange(len(vertices))[:, None]
+    weights = found.weights * rules.trust * rules.believe(itself, height, found.roughness)
     return replace(found, weights=weights)
 
 
@@ -143,7 +158,7 @@ def _pull_back(vertices, faces, normals, samples, rules, reach, tau, share):
     height = np.einsum("kc,kc->k", smooth_normals, points - nearest.points)
     agree = np.einsum("kc,kc->k", smooth_normals, point_normals) > 0.5
     weights = trust * agree * (nearest.distance <= reach)
-    weights *= rules.believe(corners, nearest.barycentric, height, roughness)
+    weights *= rules.believe(corners, height, roughness)
     weights = weights * (tau**2 / (tau**2 + nearest.distance**2)) ** 2 * share
     keep = np.flatnonzero(weights > 1e-6)
     rows = np.repeat(np.arange(len(keep)), 3)
