@@ -1,0 +1,24 @@
+"""Every benchmark, one after the other: python bench/all.py [NAME ...]. Each also runs alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+ORDER = ("transfer", "bake", "registration_truth", "real_scans", "invariance", "job")
+
+
+def main():
+    names = sys.argv[1:] or [name for name in ORDER if (Path(__file__).parent / f"{name}.py").is_file()]
+    failed = []
+    for name in names:
+        print(f"\n=== {name} ===", flush=True)
+        if subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")]).returncode:
+            failed.append(name)
+    if failed:
+        raise SystemExit(f"did not run to the end: {', '.join(failed)}")
+
+
+if __name__ == "__main__":
+    main()
