@@ -46,11 +46,21 @@ def find_benchmark_template(name):
     return None
 
 
+def fingerprint(template, *more):
+    """Short digest of what a made scan depends on in its template, and of anything else (by repr)."""
+    digest = hashlib.sha256(repr(more).encode())
+    for array in (template.vertices, template.faces, template.identity_basis):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    for name in ("outer", "face", "lip_upper", "lip_lower"):
+        digest.update(template.regions[name].tobytes())
+    return digest.hexdigest()[:16]
+
+
 def fitting_template(template):
     """The template as the fit may use it: without the modes that its test persons were made of."""
     if template.info["name"] != "hm08":
         return with_fewer_modes(template, ICT_MODES_OF_THE_FIT)
-    path = CACHE / f"hm08-test-basis-{template.info['topology_id'][:12]}-{len(template.identity_basis)}.npz"
+    path = CACHE / f"hm08-test-basis-{fingerprint(template)}.npz"
     if not path.is_file():
         modifiers = read_modifiers("hm08")
         kept, _ = split_names(modifiers.names)
@@ -74,8 +84,7 @@ def person(template, seed):
 def make_case(template: Template, seed, options=None):
     """The Case of a seed, from the cache if it is there."""
     options = options or SyntheticOptions(open_back=seed % 3 == 2)
-    key = f"{RECIPE}{template.info['topology_id']}{seed}{sorted(asdict(options).items())}"
-    digest = hashlib.sha256(key.encode()).hexdigest()[:16]
+    digest = fingerprint(template, RECIPE, seed, sorted(asdict(options).items()))
     path = CACHE / f"{template.info['name']}-{seed}-{digest}.npz"
     if not path.is_file():
         scan, truth = synthetic_scan(template, person(template, seed), seed, options)
