@@ -228,7 +228,7 @@ def _transfer(run, face, template):
     def work():
         return {"deltas": transfer_shapes(face)}, {"names": list(template.shape_names)}
 
-    arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
+    arrays, _ = run.stage("05-transfer", work, list(ARKIT_SHAPES))
     return arrays["deltas"]
 
 

@@ -71,7 +71,7 @@ class Camera:
 
     @staticmethod
     def looking_at(center, yaw_deg=0.0, pitch_deg=0.0, half_height=140.0, size=(640, 640)):
-        """yaw > 0 moves the camera to +X (the person's left), pitch > 0 above; 0, 0 looks at the face from the front."""
+        """yaw > 0 moves the camera to +X (the person's left), pitch > 0 above; 0, 0 looks from the front."""
         yaw, pitch = np.radians(yaw_deg), np.radians(pitch_deg)
         backward = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
         right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])

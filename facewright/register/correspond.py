@@ -87,7 +87,7 @@ class Target:
         return Matches(nearest.points, scan_normals, weights, nearest.distance, roughness)
 
     def samples(self, count, seed=0):
-        """(count, 3) points spread evenly by area over the open part of the scan, normals (count, 3), roughness (count,)."""
+        """Points (count, 3) spread evenly over the open part of the scan, normals (count, 3), roughness (count,)."""
         openness = self.openness[self.faces].mean(axis=1)
         areas = face_areas(self.vertices, self.faces) * (openness > self.MIN_OPENNESS)
         rng = np.random.default_rng(seed)

@@ -89,7 +89,7 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
 
 
 def _smoothed(height, trust, step_mm):
-    """The path's height along its columns: followed closely where the crease is deep, smoothed over where it is faint."""
+    """The path's height along its columns: followed closely where the crease is deep, smoothed where it is faint."""
     width = 0.6 + 2.4 * (1.0 - float(np.clip(np.median(trust), 0.0, 1.0)))
     weights = gaussian_filter1d(trust, width / step_mm, mode="nearest")
     return gaussian_filter1d(height * trust, width / step_mm, mode="nearest") / weights

@@ -25,7 +25,7 @@ from facewright.solve.quadratic import Factorization
 
 @dataclass(frozen=True)
 class Rows:
-    """Point-to-plane or point-to-point rows: weights (r,), matrix csr (r, n), targets (r, 3), normals (r, 3) or None."""
+    """Point-to-plane or -point rows: weights (r,), matrix csr (r, n), targets (r, 3), normals (r, 3) or None."""
 
     matrix: sp.csr_matrix
     targets: np.ndarray

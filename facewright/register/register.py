@@ -66,7 +66,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     pairs = _landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
     model, names = _fit_model(template, target, pairs, closed, options.model)
-    lines, leading, line_stats = _leading_lines(scan, template, model, pairs, closed)
+    leading, line_stats = _leading_lines(scan, template, model, pairs, closed)
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
@@ -169,7 +169,7 @@ def eyes_closed(pairs):
 
 
 def _expressions(template, closed):
-    """What the scan may wear: lids shut where they were found shut, and a slight smile. Tuples of shapes, and deltas."""
+    """What the scan may wear, as tuples of shapes and deltas: lids found shut, and a slight smile."""
     lids = [(f"eyeBlink{SIDES[side]}",) for side in SIDES if closed[side]]
     names = [SMILE, *lids]
     deltas = np.stack([sum(template.shape(name) for name in together) for together in names])
@@ -208,12 +208,12 @@ def _interior(template):
 
 
 def _leading_lines(scan, template, model, pairs, closed):
-    """Feature lines found on the scan, the rows that lead the skin to them, and what to report."""
+    """The rows that lead the skin to feature lines found on the scan, and what to report."""
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     normals = vertex_normals(model.vertices[:stop], faces)
     darkness = texture_darkness(scan)
-    found, leading, stats = {}, [], {}
+    leading, stats = [], {}
     if pairs.by_hand.any():
         rows = Rows(
             pairs.rows[pairs.by_hand][:, :stop], pairs.points[pairs.by_hand], np.full(pairs.by_hand.sum(), 40.0)
@@ -226,7 +226,6 @@ def _leading_lines(scan, template, model, pairs, closed):
     stats["lips_closed"] = crease.found
     stats["lip_crease_mm"] = float(np.median(crease.strength))
     if crease.found:
-        found["lip_seam"] = crease.points
         for line in (upper, lower):
             leading.append(line_rows(line, crease.points, LINE_WEIGHT * crease_trust(crease), stop))
         contact = contact_rows(upper[1:-1], lower[1:-1], 30.0, stop)
@@ -249,12 +248,11 @@ def _leading_lines(scan, template, model, pairs, closed):
         if crease.found:
             order = slice(None) if side == "left" else slice(None, None, -1)
             points, trust = crease.points[order], crease_trust(crease)[order]
-            found[f"lid_line_{side}"] = points
             for margin in (lid_upper, lid_lower):
                 leading.append(line_rows(margin, points, LINE_WEIGHT * trust, stop))
             contact = contact_rows(*_paired(lid_upper, lid_lower, model.vertices), 10.0, stop)
             leading.append(lambda _vertices, contact=contact: contact)
-    return found, tuple(leading), stats
+    return tuple(leading), stats
 
 
 def crease_trust(crease):

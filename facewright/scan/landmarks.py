@@ -18,7 +18,7 @@ VIEWS = tuple((float(yaw), float(pitch)) for pitch in (-15, 0, 15) for yaw in (-
 VIEW_CENTER, VIEW_HALF_HEIGHT, VIEW_SIZE = (0.0, -30.0, 20.0), 150.0, 384
 
 # Lips, eyes and nose: 1 to 2.5 mm from the truth on heads where it is known; brows 1-2.5, the oval 3-5.
-OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377)
+OVAL: tuple[int, ...] = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377)
 OVAL = (*OVAL, 152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109)
 LIPS_OUTER = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 185, 40, 39, 37, 0, 267, 269, 270, 409)
 LIPS_INNER = (78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308, 191, 80, 81, 82, 13, 312, 311, 310, 415)
@@ -29,7 +29,7 @@ STABLE = LIPS_OUTER + LIPS_INNER + EYE_RIGHT + EYE_LEFT + NOSE
 
 # iBUG-68 p1..p68 in MediaPipe's numbering, the person's right first. Outline and brows are the same lines with other
 # points on them.
-IBUG68 = (127, 93, 132, 58, 136, 150, 149, 148, 152, 377, 378, 379, 365, 288, 361, 323, 356)
+IBUG68: tuple[int, ...] = (127, 93, 132, 58, 136, 150, 149, 148, 152, 377, 378, 379, 365, 288, 361, 323, 356)
 IBUG68 = (*IBUG68, 70, 63, 105, 66, 107, 336, 296, 334, 293, 300, 8, 6, 195, 4, 98, 97, 2, 326, 327)
 IBUG68 = (*IBUG68, 33, 160, 158, 133, 153, 144, 362, 385, 387, 263, 373, 380)
 IBUG68 = (*IBUG68, 61, 40, 37, 0, 267, 270, 291, 321, 314, 17, 84, 91, 78, 82, 13, 312, 308, 317, 14, 87)

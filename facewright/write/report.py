@@ -50,7 +50,7 @@ def build_report(scan, face, rig, clean_stats, pose_info):
 
 
 def neutral_changes(face):
-    """How far the rig's neutral is from the fit: mean outside eyes and lips, and the largest removal with its region."""
+    """How far the rig's neutral is from the fit: outside eyes and lips, and the largest removal with its region."""
     moved = np.linalg.norm(face.vertices - face.fit, axis=1)
     regions = face.regions
     outside = regions["face"] & ~regions["eyes"] & ~regions["lips"]
