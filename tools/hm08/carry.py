@@ -10,12 +10,13 @@ import scipy.sparse as sp
 
 from facewright.mesh.normals import normalized
 from facewright.solve.quadratic import Factorization
-from hm08.density import SEAM_RING
+from hm08.density import NEW_CORNER, SEAM_RING
 from hm08.eyeball import height_above
 from hm08.neutral import LID_GAP_MM, inside_faces
 from hm08.spread import bilaplacian, spread
 
 SEAM_WEIGHT = 1e4
+CONTACT_RINGS = (0.7, 2.5)  # how many rings about the seam move as one: along the lips, and more at the corners
 NOSE_RADIUS_MM = 22.0
 NEAR_BALL_MM = 1.0  # margin points that stand off further than this follow the lids' own corner
 
@@ -44,8 +45,7 @@ class Carrier:
         mouth = V[control.mouth.rings[SEAM_RING]].mean(axis=0)
         near = np.linalg.norm((V - mouth) * [0.8, 1.0, 1.0], axis=1) < 36.0
         self.around_mouth = np.flatnonzero(near)
-        upper, lower = head.lines["lip_seam_upper"], head.lines["lip_seam_lower"]
-        self.seam_difference = (head.S[upper[1:-1]] - head.S[lower[1:-1]]).tocsr()
+        self.seam_difference = contact_rows(head)
         self.seam_local = self.seam_difference[:, self.around_mouth]
         stiffness = self.K[self.around_mouth][:, self.around_mouth]
         self.lips = Factorization(
@@ -82,6 +82,28 @@ class Carrier:
         out = skin.copy()
         out[self.around_mouth] -= self.lips.solve(SEAM_WEIGHT * (self.seam_local.T @ open_by))
         return out
+
+
+def contact_rows(head):
+    """(k, c_skin) operator: by how much vertices that lie face to face on the closed lips move apart, weighted.
+
+    Full weight at the seam, less on the rings before and behind it; near the corners, where the lips lie together
+    further out, on more of them.
+    """
+    corner = round(4 * NEW_CORNER)
+    mouth = head.grid["mouth"]
+    upper, lower, weight = [], [], []
+    for (r, c), v in mouth.items():
+        other = mouth.get((r, 2 * corner - c))
+        if c >= corner or other is None:
+            continue
+        reach = CONTACT_RINGS[0] + CONTACT_RINGS[1] * np.exp(-(((corner - c) / 8.0) ** 2))
+        w = np.exp(-(((r / 4 - SEAM_RING) / reach) ** 2))
+        if w > 0.05:
+            upper += [other, head.mirror[other]]
+            lower += [v, head.mirror[v]]
+            weight += [w, w]
+    return (sp.diags(weight) @ (head.S[upper] - head.S[lower])).tocsr()
 
 
 def carry_nostrils(control):

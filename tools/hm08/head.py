@@ -25,7 +25,7 @@ from hm08.neutral import (
 from hm08.spread import bilaplacian
 from hm08.subdivide import triangulate
 
-VERMILION_RING = 7  # of the mouth's grid: the border of the red
+VERMILION_RING = 6.5  # of the mouth's grid: the border of the red
 NOSTRIL_RIM_RING = 1
 
 
