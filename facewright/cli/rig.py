@@ -21,11 +21,23 @@ def add_job_arguments(parser):
     """Options that `rig` and `demo` share."""
     parser.add_argument("--template", default="hm08", metavar="NAME|FOLDER", help="template to fit (default: hm08)")
     parser.add_argument("--texture-size", type=_texture_size, default=2048, metavar="N", help="pixels (default: 2048)")
-    parser.add_argument("--eyes", choices=("template", "as-scanned"), default="template", help="closed lids: open them to the template's aperture, or leave them (default: template)")
-    parser.add_argument("--formats", type=_formats, default=("glb",), metavar="LIST", help="glb, obj, comma-separated (default: glb)")
+    parser.add_argument(
+        "--eyes",
+        choices=("template", "as-scanned"),
+        default="template",
+        help="closed lids: open them to the template's aperture, or leave them (default: template)",
+    )
+    parser.add_argument(
+        "--formats", type=_formats, default=("glb",), metavar="LIST", help="glb, obj, comma-separated (default: glb)"
+    )
     parser.add_argument("--shapes", choices=("apple",), default="apple", help="apple: exactly the 52 ARKit shapes")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="threads; the result does not depend on it")
-    parser.add_argument("--from", dest="from_stage", metavar="STAGE", help="run again from read, landmarks, register, parts, transfer, bake or write")
+    parser.add_argument(
+        "--from",
+        dest="from_stage",
+        metavar="STAGE",
+        help="run again from read, landmarks, register, parts, transfer, bake or write",
+    )
     parser.add_argument("--quiet", action="store_true", help="print no progress")
 
 
@@ -38,7 +50,7 @@ def add_arguments(parser):
     parser.add_argument("--units", choices=tuple(MM_PER_UNIT), help="unit of the scan (default: found)")
     parser.add_argument("--up", choices=UPS, help="up axis of the scan (default: found)")
     parser.add_argument("--mirror", action="store_true", help="the scan is a mirror image: turn it round")
-    parser.add_argument("--landmarks", metavar="FILE", help="JSON with landmarks placed by hand (docs/landmarks.md)")
+    parser.add_argument("--landmarks", metavar="FILE", help="JSON with landmarks placed by hand (docs/input.md)")
     add_job_arguments(parser)
 
 
