@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from facewright.mesh.spread import spread_smoothly
-from facewright.transfer.eyeball import eye_parts, lid_clearance, measure_eyeball
+from facewright.transfer.eyeball import angle_from, eye_parts, lid_clearance, measure_eyeball
 
 EYE_RADIUS_MM = 12.0
 RADIUS_LIMITS_MM = (11.0, 13.0)
+_RIM_DEG, _DRAWN_IN = 38.0, 0.05
 _CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
 
 
@@ -62,13 +63,20 @@ def place_eyeball(template, vertices, lines, side, radius, options=None):
 
 
 def moved_to(template, side, ball):
-    """part name -> vertices (k, 3) of an eye's parts, brought to a ball by shift and scale: it looks straight ahead."""
+    """part name -> vertices (k, 3) of an eye's parts, brought to a ball by shift and scale: it looks straight ahead.
+
+    What a separate iris has beyond its rim is drawn in a little, else it would show through the white in places.
+    """
     own = measure_eyeball(template, side)
     scale = ball.radius / own.radius
-    return {
-        part.name: ball.center + (template.vertices[part.vertex_slice] - own.center) * scale
-        for part in eye_parts(template, side)
-    }
+    placed = {}
+    for part in eye_parts(template, side):
+        offset = (template.vertices[part.vertex_slice] - own.center) * scale
+        if part.name.startswith("iris"):
+            beyond = np.clip((np.degrees(angle_from(own.axis, offset)) - _RIM_DEG) / 15.0, 0.0, 1.0)
+            offset = offset * (1.0 - _DRAWN_IN * beyond)[:, None]
+        placed[part.name] = ball.center + offset
+    return placed
 
 
 def _margin(vertices, lines, side):

@@ -95,7 +95,8 @@ def _fit_mouth(template, vertices, parts, options):
     R, scale, t = best_similarity(template.vertices[skin], vertices[skin], weights, options.mouth_scale)
     placed = scale * rest @ R.T + t
     front = _front_teeth(template, parts)
-    allowed = _Mouth(template, template.vertices).misplaced(rest[front]) + [options.poke_mm, options.show_share]
+    depth, share = _Mouth(template, template.vertices).misplaced(rest[front])
+    allowed = np.array([scale * depth + options.poke_mm, share + options.show_share])
     person = _Mouth(template, vertices)
     steps = np.arange(0.0, options.most_back_mm + 1e-9, 0.5)
     tried = []

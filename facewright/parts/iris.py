@@ -12,6 +12,7 @@ from facewright.mesh.raster import raster_uv
 from facewright.mesh.render import linear_to_srgb
 from facewright.transfer.eyeball import angle_from
 
+_RIM_DEG = 16.0
 _DARK = 0.004  # linear: what is seen through a pupil
 
 
@@ -73,7 +74,7 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
     """A texture (size, size, 3) uint8 sRGB for one eye part in its own UVs; beyond its charts the nearest texel.
 
     vertices (n, 3), faces (m, 3), uv (t, 2), uv_faces (m, 3); ball eyes.Eyeball at rest
-    inner  the part lies inside the ball (a separate iris): its back half is seen through the pupil, dark
+    inner  the part lies inside the ball (a separate iris): what is behind its rim is seen through the pupil, dark
     """
     look = look or EyeLook()
     face, barycentric = raster_uv(uv, uv_faces, look.size)
@@ -83,7 +84,7 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
     directions = interpolate(vertices, faces, face[seen], barycentric[seen]) - ball.center
     colors = eye_colors(directions, ball.axis, look)
     if inner:
-        colors[angle_from(ball.axis, directions) > np.pi / 2] = _DARK
+        colors[np.degrees(angle_from(ball.axis, directions)) > look.iris_deg + _RIM_DEG] = _DARK
     image = np.empty((look.size, look.size, 3))
     image[seen] = colors
     rows, columns = distance_transform_edt(~seen, return_distances=False, return_indices=True)

@@ -50,12 +50,9 @@ def clear_lids(face, deltas, options=None):
             if not moves.any():
                 continue
             at = lid[moves]
-            gap, direction = person.at(at, k)
-            before, _ = person.at(at, None)
-            push = _push(gap, clear[moves], options) - _push(before, clear[moves], options)
-            push -= _push(scale * own.at(at, k)[0], clear[moves], options)
-            push += _push(scale * own.at(at, None)[0], clear[moves], options)
-            result[k, at] += np.maximum(push, 0.0)[:, None] * direction
+            wanted, direction = person.missing(at, k, clear[moves], 1.0, options.soft_mm)
+            allowed, _ = own.missing(at, k, clear[moves], scale, options.soft_mm)
+            result[k, at] += np.maximum(wanted - allowed, 0.0)[:, None] * direction
     return result
 
 
@@ -66,14 +63,19 @@ class _Gaps:
         self.vertices, self.deltas, self.ball = vertices, deltas, ball
         self.eye = [part.vertex_slice for part in eye_parts(template, side)]
 
-    def at(self, index, shape):
-        """(k,) gaps and (k, 3) directions away from the eye's centre of vertices; shape is a number or None."""
+    def missing(self, index, shape, clear, scale, soft_mm):
+        """(k,) mm by which vertices come too close under a shape, and (k, 3) directions away from the eye's centre.
+
+        Too close is closer than clear (k,), or than at rest where that is less. Gaps count times scale; the measure is
+        0 far outside, the whole depth inside, and smooth in between.
+        """
         points, ball = self.vertices[index], self.ball
-        if shape is not None:
-            points = points + self.deltas[shape, index]
-            ball = self._turned(shape)
+        rest = scale * ball.gap(points)
+        points, ball = points + self.deltas[shape, index], self._turned(shape)
+        floor = np.minimum(rest, clear)
         offset = points - ball.center
-        return ball.gap(points), offset / np.linalg.norm(offset, axis=1, keepdims=True)
+        missing = _soft(floor - scale * ball.gap(points), soft_mm) - _soft(floor - rest, soft_mm)
+        return missing, offset / np.linalg.norm(offset, axis=1, keepdims=True)
 
     def _turned(self, shape):
         """The ball under a shape that turns the eye: its cornea looks elsewhere."""
@@ -91,7 +93,6 @@ def _lid_vertices(face, side):
     return np.flatnonzero(face.regions["eyes"] & near & ~face.regions[f"socket_{side}"])
 
 
-def _push(gap, clear, options):
-    """(k,) mm outwards for a gap: 0 far outside, all that is missing inside, smooth in between."""
-    missing = clear - gap
-    return 0.5 * (missing + np.sqrt(missing**2 + options.soft_mm**2))
+def _soft(value, width):
+    """The positive part of values, rounded over a width."""
+    return 0.5 * (value + np.sqrt(value**2 + width**2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from facewright.parts import fit_parts
-from facewright.parts.eyes import moved_to
+from facewright.parts.eyes import fit_lids, moved_to
 from facewright.transfer.eyeball import carried_eyeball, lid_clearance, measure_eyeball
 from facewright.transfer.lids import clear_lids
 from facewright.transfer.shapes import TransferOptions, transfer_shapes
@@ -14,11 +14,12 @@ from facewright.transfer.shapes import TransferOptions, transfer_shapes
 
 @pytest.fixture(scope="module")
 def bulging(hm08, hm08_person):
-    """A person whose left eye stands 1.2 mm farther out than the lids expect."""
+    """A person whose left eye stands 1.5 mm farther out than most, and whose lids are fitted to it."""
     face = fit_parts(hm08_person(4))
     ball = carried_eyeball(hm08, face.vertices, "left")
-    V = face.vertices.copy()
-    for name, placed in moved_to(hm08, "left", replace(ball, center=ball.center + [0, 0, 1.2])).items():
+    ball = replace(ball, center=ball.center + [0, 0, 1.5])
+    V, _ = fit_lids(hm08, face.vertices, face.regions, face.lines, "left", ball)
+    for name, placed in moved_to(hm08, "left", ball).items():
         V[hm08.part(name).vertex_slice] = placed
     return replace(face, vertices=V)
 
@@ -38,15 +39,14 @@ def test_a_blink_clears_a_bulging_eye(hm08, bulging):
     clear = transfer_shapes(bulging)
     k = hm08.shape_names.index("eyeBlinkLeft")
     ball, at = carried_eyeball(hm08, bulging.vertices, "left"), lid_skin(bulging, "left")
-    at = at[np.linalg.norm(plain[k, at], axis=1) > 2]
     before, after = (ball.gap(bulging.vertices[at] + shapes[k, at]).min() for shapes in (plain, clear))
-    assert before < -0.5 and after > -0.3
+    assert before < -0.01 and after > before and after > -0.05
 
 
 def test_shapes_that_hardly_move_the_lids_are_hardly_touched(hm08, bulging):
     plain = transfer_shapes(bulging, TransferOptions(contact=None))
     changed = np.abs(clear_lids(bulging, plain) - plain).max(axis=(1, 2))
-    assert changed[hm08.shape_names.index("eyeBlinkLeft")] > 0.3
+    assert changed[hm08.shape_names.index("eyeBlinkLeft")] > 0.1
     assert changed[hm08.shape_names.index("tongueOut")] == 0
     for name in ("jawOpen", "mouthFunnel", "mouthSmileLeft"):
         assert changed[hm08.shape_names.index(name)] < 0.2, name

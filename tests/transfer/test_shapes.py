@@ -109,3 +109,12 @@ def test_links_pair_the_lines_and_can_be_left_out(hm08):
         (hm08.vertices[link.pairs[:, 0], 0] * hm08.vertices[link.pairs[:, 1], 0] >= -1.0).all() for link in links
     )
     assert feature_links(hm08.lines, hm08.vertices, TransferOptions(w_lids=0, w_lips=0)) == ()
+
+
+def test_eyelids_do_not_follow_the_jaw(hm08, hm08_person):
+    """What rests on the template rests on the person, however far the jaw opens."""
+    k = hm08.shape_names.index("jawOpen")
+    for seed in (4, 5):
+        motion = np.linalg.norm(transfer_shapes(fit_parts(hm08_person(seed)))[k], axis=1)
+        still = np.linalg.norm(hm08.deltas[k], axis=1) < 0.05
+        assert motion[still & hm08.regions["skin"]].max() < 0.12
