@@ -7,6 +7,7 @@ out).
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -120,6 +121,11 @@ def modifier_axes(names):
     return axes
 
 
+@functools.lru_cache(maxsize=8)
+def _axes_of(names):
+    return modifier_axes(names)
+
+
 def _opposite(name):
     """The name of a modifier's opposite (None if it has none) and whether the given one is the positive end."""
     if name.startswith("asym-"):
@@ -144,7 +150,7 @@ def sample_weights(rng, names):
     index = {name: i for i, name in enumerate(names)}
     weights = np.zeros(len(names))
     shared = {}
-    for positive, negative in modifier_axes(names):
+    for positive, negative in _axes_of(tuple(names)):
         spread = next((value for start, value in SPREADS.items() if positive.startswith(start)), SPREAD)
         amount = float(np.clip(rng.normal(0.0, spread), -1.0, 1.0))
         if positive[:2] in ("l-", "r-"):

@@ -1,0 +1,196 @@
+"""The shipped template: what its asset promises, measured."""
+
+import numpy as np
+import pytest
+
+from facewright.conventions import ARKIT_SHAPES, mirrored_name
+from facewright.evaluate.quality import lip_gaps_mm, self_intersections, visible_interior_mm2
+from facewright.evaluate.uv import measure_uv
+from facewright.mesh.adjacency import border_loops, half_edges, unique_edges
+from facewright.template.store import SHIPPED
+
+FLIP = np.array([-1.0, 1.0, 1.0])
+FOLDER = SHIPPED / "hm08"
+
+
+@pytest.fixture(scope="module")
+def skin_faces(hm08):
+    return hm08.faces[hm08.skin.face_slice]
+
+
+def test_it_is_small_and_says_where_it_comes_from():
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= 10e6
+    notice = (FOLDER / "LICENSE.txt").read_text()
+    assert "CC0 1.0" in notice and "Face Units asset pack by Mika Suominen" in notice and "Data Collection AB" in notice
+
+
+def test_counts_and_edge_lengths(hm08, skin_faces):
+    assert 15_000 <= len(hm08.vertices) <= 25_000
+    edges = unique_edges(skin_faces)
+    length = np.linalg.norm(np.subtract(*hm08.vertices[edges.T]), axis=1)
+    for region, most in (("lips", 1.7), ("eyes", 1.7), ("face", 2.6)):
+        assert length[hm08.regions[region][edges].all(axis=1)].mean() < most
+
+
+def test_skin_is_one_shell_with_one_border(hm08, skin_faces):
+    edges = half_edges(skin_faces)
+    assert len(np.unique(edges, axis=0)) == len(edges)
+    (ring,) = border_loops(skin_faces)
+    assert set(ring.tolist()) == set(hm08.lines["neck_ring"].tolist())
+
+
+def test_mirror_is_exact(hm08):
+    mirror = hm08.mirror
+    assert (mirror[mirror] == np.arange(len(mirror))).all()
+    np.testing.assert_array_equal(hm08.vertices[mirror], hm08.vertices * FLIP)
+    faces = {tuple(sorted(face)) for face in hm08.faces.tolist()}
+    assert faces == {tuple(sorted(face)) for face in mirror[hm08.faces].tolist()}
+    for name, mask in hm08.regions.items():
+        twin = {"left": "right", "right": "left"}.get(name.rsplit("_", 1)[-1])
+        other = name.rsplit("_", 1)[0] + "_" + twin if twin else name
+        np.testing.assert_array_equal(mask[mirror], hm08.regions[other])
+
+
+def test_frame_and_eyes(hm08):
+    centers = hm08.skeleton.positions[3:]
+    np.testing.assert_allclose(centers.mean(axis=0)[:2], 0.0, atol=1e-9)
+    assert 62.0 <= centers[0, 0] - centers[1, 0] <= 63.0
+    eye = hm08.vertices[hm08.part("eye_left").vertex_slice] - centers[0]
+    radius = np.linalg.norm(eye, axis=1)
+    assert np.isclose(np.median(radius), 12.0, atol=0.01)
+    front = eye[:, 2].argmax()
+    assert 12.9 < radius[front] < 13.3
+    np.testing.assert_allclose(eye[front, :2], 0.0, atol=1e-9)
+
+
+def test_lids_lie_on_the_ball_and_nothing_enters_it(hm08, skin_faces):
+    center = hm08.skeleton.positions[3]
+    margin = np.unique(np.concatenate([hm08.lines["lid_upper_left"], hm08.lines["lid_lower_left"]]))
+    gap = np.linalg.norm(hm08.vertices[margin] - center, axis=1) - 12.0
+    assert 0.1 < np.quantile(gap, 0.25) < 0.2 and gap.max() < 2.0
+    eye = hm08.faces[hm08.part("eye_left").face_slice]
+    assert len(self_intersections(hm08.vertices, np.concatenate([skin_faces, eye]))) == 0
+
+
+def test_lips_are_closed(hm08, skin_faces):
+    upper, lower = hm08.lines["lip_seam_upper"], hm08.lines["lip_seam_lower"]
+    assert upper[0] == lower[0] and upper[-1] == lower[-1] and len(upper) == len(lower)
+    assert hm08.vertices[upper[0], 0] < 0 < hm08.vertices[upper[-1], 0]
+    gaps = lip_gaps_mm(hm08.vertices, hm08.lines)[1:-1]
+    assert gaps.min() >= 0.05 and gaps.max() <= 0.2
+    assert len(self_intersections(hm08.vertices[: hm08.skin.vertices[1]], skin_faces)) == 0
+    teeth_and_tongue = np.zeros(len(hm08.faces), bool)
+    for name in ("teeth_upper", "teeth_lower", "tongue"):
+        teeth_and_tongue[hm08.part(name).face_slice] = True
+    mouth = hm08.vertices[upper].mean(axis=0)
+    assert visible_interior_mm2(hm08.vertices, hm08.faces, teeth_and_tongue, mouth) < 0.1
+
+
+def test_lines_run_the_way_they_should(hm08):
+    V, lines = hm08.vertices, hm08.lines
+    for side, sign in (("left", 1), ("right", -1)):
+        upper, lower = lines[f"lid_upper_{side}"], lines[f"lid_lower_{side}"]
+        assert upper[0] == lower[0] and upper[-1] == lower[-1]
+        assert sign * V[upper[0], 0] < sign * V[upper[-1], 0]  # inner corner first
+        assert V[upper, 1].mean() > V[lower, 1].mean()
+    edges = {tuple(edge) for edge in unique_edges(hm08.faces).tolist()}
+    for name, line in lines.items():
+        pairs = np.sort(np.stack([line[:-1], line[1:]], axis=1), axis=1)
+        assert all(tuple(pair) in edges for pair in pairs.tolist()), name
+
+
+def test_nostrils_have_depth(hm08):
+    inside = hm08.regions["nostrils"] & (hm08.vertices[:, 0] > 0)
+    rim = hm08.vertices[hm08.lines["nostril_left"]]
+    assert (hm08.vertices[inside, 1] - rim[:, 1].max()).max() > 6.0
+    assert hm08.openness[inside].mean() < 0.2 < hm08.openness[hm08.regions["face"]].mean()
+
+
+def test_regions_fit_together(hm08):
+    regions = hm08.regions
+    inner = ["mouth_interior", "socket_left", "socket_right", "nostrils"]
+    for name in inner:
+        assert not (regions[name] & regions["outer"]).any()
+    n_skin = hm08.skin.vertices[1]
+    assert (np.sum([regions[name] for name in (*inner, "outer")], axis=0)[:n_skin] == 1).all()
+    for name in ("face", "lips", "eyes", "neck", "scalp", "ear_left", "lip_upper", "lip_lower", "skull"):
+        assert regions[name].any() and not (regions[name] & ~regions["outer"]).any()
+    large = ("face", "neck", "scalp", "ear_left", "ear_right")
+    assert (np.sum([regions[name] for name in large], axis=0)[regions["outer"]] == 1).all()
+
+
+def test_atlas_meets_its_bars(hm08):
+    figures = measure_uv(hm08)
+    assert figures["front_share"] >= 0.20
+    assert figures["front_px_per_mm_median"] >= 12.0 and figures["front_px_per_mm_p5"] >= 12.0
+    assert figures["front_anisotropy_p95"] <= 1.5
+    assert figures["front_scale_min"] >= 0.5 and figures["front_scale_max"] <= 2.0
+    assert figures["flipped"] == 0 and figures["overlap_texels"] == 0
+    assert figures["front_pieces"] == 1 and figures["front_seam_edges"] == 0
+    assert hm08.uv.min() >= 0.0 and hm08.uv.max() <= 1.0
+
+
+def test_shapes_are_symmetric_and_leave_the_skull_alone(hm08):
+    assert hm08.shape_names == ARKIT_SHAPES
+    for name in ARKIT_SHAPES:
+        delta = hm08.shape(name)
+        np.testing.assert_array_equal(delta[hm08.mirror] * FLIP, hm08.shape(mirrored_name(name)))
+        assert 1.0 < np.linalg.norm(delta, axis=1).max() < 45.0
+        assert not delta[hm08.regions["skull"]].any()
+    blink = hm08.shape("eyeBlinkLeft")
+    assert not blink[hm08.regions["socket_right"] | hm08.regions["mouth_interior"]].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "sign", "degrees"), [("Up", 1, 1, 25), ("Down", 1, -1, 30), ("Out", 0, 1, 30)]
+)
+def test_eyes_turn_about_their_centres(hm08, name, axis, sign, degrees):
+    part = hm08.part("eye_left").vertex_slice
+    center = hm08.skeleton.positions[3]
+    before = hm08.vertices[part] - center
+    after = before + hm08.shape(f"eyeLook{name}Left")[part]
+    np.testing.assert_allclose(np.linalg.norm(after, axis=1), np.linalg.norm(before, axis=1), atol=0.005)
+    gaze = after[before[:, 2].argmax()]
+    assert np.isclose(np.degrees(np.arcsin(gaze[axis] / np.linalg.norm(gaze))) * sign, degrees, atol=0.1)
+
+
+def test_jaw_carries_teeth_and_tongue_rigidly(hm08):
+    jaw_open = hm08.shape("jawOpen")
+    assert not jaw_open[hm08.part("teeth_upper").vertex_slice].any()
+    for name in ("teeth_lower", "tongue"):
+        part = hm08.part(name).vertex_slice
+        before, after = hm08.vertices[part], hm08.vertices[part] + jaw_open[part]
+        gram = [points - points.mean(axis=0) for points in (before, after)]
+        np.testing.assert_allclose(gram[0] @ gram[0].T, gram[1] @ gram[1].T, atol=0.5)
+    chin = jaw_open[hm08.regions["face"]].min(axis=0)[1]
+    assert -45 < chin < -30
+
+
+def test_identities_keep_eyes_lips_and_origin(hm08):
+    rng = np.random.default_rng(4)
+    left, right = hm08.part("eye_left").vertex_slice, hm08.part("eye_right").vertex_slice
+    for _ in range(4):
+        delta = np.tensordot(rng.standard_normal(len(hm08.identity_basis)), hm08.identity_basis, axes=1)
+        np.testing.assert_allclose(delta[left], np.broadcast_to(delta[left][0], delta[left].shape), atol=1e-9)
+        np.testing.assert_allclose(delta[left][0] + delta[right][0], 0.0, atol=0.02)
+        assert lip_gaps_mm(hm08.vertices + delta, hm08.lines).max() < 0.2
+
+
+def test_skin_weights_and_skeleton(hm08):
+    np.testing.assert_allclose(hm08.skin_weights.sum(axis=1), 1.0)
+    assert hm08.skeleton.names == ("neck", "head", "jaw", "eye_left", "eye_right")
+    jaw = hm08.skin_weights[:, 2]
+    assert jaw[hm08.part("teeth_lower").vertex_slice].min() == 1.0
+    assert jaw[hm08.regions["lip_lower"]].mean() > 0.5 > jaw[hm08.regions["lip_upper"]].mean()
+    assert hm08.skin_weights[hm08.lines["neck_ring"], 0].min() > 0.9
+
+
+def test_landmarks_are_symmetric_and_on_the_features(hm08):
+    marks = dict(zip(hm08.landmarks.names, hm08.landmarks.positions(hm08.vertices, hm08.faces)))
+    assert len(marks) == 478 + 68
+    np.testing.assert_allclose(marks["p49"] * FLIP, marks["p55"], atol=0.3)
+    corner = hm08.vertices[hm08.lines["lip_seam_upper"][-1]]
+    assert np.linalg.norm((marks["p55"] - corner)[:2]) < 3.0
+    assert np.linalg.norm((marks["mp473"] - hm08.skeleton.positions[3])[:2]) < 2.5
+    nose = hm08.vertices[hm08.vertices[:, 2].argmax()]
+    assert np.linalg.norm(marks["p31"] - nose) < 8.0
