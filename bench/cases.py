@@ -22,7 +22,7 @@ from facewright.template.store import read_template
 
 SEEDS = tuple(range(10))
 ICT_MODES_OF_THE_FIT = 20
-RECIPE = 7
+RECIPE = 8
 """Counted up when what a seed makes changes, so that old cache files are not taken for new ones."""
 
 

@@ -174,7 +174,8 @@ def chin_height(template, vertices):
 def _kept(centers, template, vertices, chin, rng, seed, options):
     """(m,) bool: faces that the scanner saw; centers (m, 3)."""
     wave = 4.0 * fractal_noise(centers, 25.0, seed + 11)
-    kept = centers[:, 1] + 0.25 * centers[:, 2] > chin - 55.0 + wave
+    ring = vertices[template.lines["neck_ring"]] @ [0.0, 1.0, 0.25]
+    kept = centers @ [0.0, 1.0, 0.25] > max(chin - 55.0, ring.max() + 8.0) + wave
     if options.open_back:
         ears = template.regions["ear_left"] | template.regions["ear_right"]
         kept &= centers[:, 2] > vertices[ears, 2].mean() - 12.0 + wave

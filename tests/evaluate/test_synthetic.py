@@ -77,8 +77,14 @@ def test_faults_are_there(template, person, made):
     assert len(border_loops(scan.faces)) >= 4  # neck, collar and at least two holes or strands
     off = Surface(*truth["surface"]).closest(scan.vertices).distance
     assert (off > 4.0).mean() > 0.1  # hair
-    neck = truth["vertices"][template.lines["neck_ring"]]
-    assert np.median(distance_to(scan, neck)) > 5.0  # cut above the ring
+
+
+def test_the_neck_is_cut(template, bare):
+    scan, truth = bare
+    outer = truth["vertices"][template.regions["outer"]]
+    gone = distance_to(scan, outer) > 2.0
+    assert 0.01 < gone.mean() < 0.3
+    assert outer[gone, 1].max() < truth["vertices"][template.lines["lip_seam_lower"], 1].min()
 
 
 def test_the_back_can_be_missing(template, person, bare):
