@@ -116,6 +116,8 @@ def fit_lids(template, vertices, regions, lines, side, ball, options=None):
     options = options or LidOptions()
     part = template.skin
     faces = template.faces[part.face_slice]
+    # With their mirror images, so that both eyes are treated alike however their quads are cut.
+    faces = np.concatenate([faces, template.mirror[faces][:, [0, 2, 1]]])
     V = vertices[part.vertex_slice]
     rest = template.vertices[part.vertex_slice]
     free = _lid_region(V, regions, part, side, ball)

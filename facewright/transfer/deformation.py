@@ -112,22 +112,24 @@ class DeformationTransfer:
     source, target (n, 3) mm, faces (m, 3); fixed (n,) bool: never moves (at least one vertex)
     links   tuple of Links; nearest_links are added for components without a fixed vertex
     rotation (3, 3) that turns the source onto the target; default: the best one for what moves
+    face_weights (m,) factors on the areas, default 1
     cost    one sparse Cholesky factorisation; see bench/transfer.py
     """
 
-    def __init__(self, source, target, faces, *, fixed, links=(), rotation=None):
+    def __init__(self, source, target, faces, *, fixed, links=(), rotation=None, face_weights=None):
         source, target = np.asarray(source, float), np.asarray(target, float)
         faces, fixed = np.asarray(faces), np.asarray(fixed, bool)
         _check(source, target, faces, fixed)
         n = len(source)
-        areas = face_areas(target, faces)
+        face_weights = np.ones(len(faces)) if face_weights is None else np.asarray(face_weights, float)
+        areas = face_areas(target, faces) * face_weights
         moving_faces = ~fixed[faces].all(axis=1)
         weights = np.bincount(faces.ravel(), weights=np.repeat(areas * moving_faces, 3), minlength=n)
         if rotation is None:
             rotation = best_rotation(source, target, weights if weights.any() else None)
         self.rotation = rotation
         self.source = source @ self.rotation.T
-        self.faces = faces[moving_faces]
+        self.faces, self._face_weights = faces[moving_faces], face_weights[moving_faces]
         self.fixed = fixed
         self._normals = face_normals(self.source, self.faces)
         links = (*links, nearest_links(source, faces, fixed))
@@ -139,7 +141,7 @@ class DeformationTransfer:
     def _set_up(self, target, free):
         """Factor the Poisson matrix and make the operators that turn source motion into right-hand sides."""
         n, faces, pairs = len(target), self.faces, self._pairs
-        half_cot = _cotangents(target, faces)
+        half_cot = _cotangents(target, faces) * self._face_weights[:, None]
         w_bc, w_ac, w_ab = half_cot[:, 0], half_cot[:, 1], half_cot[:, 2]
         # Rows a, b, c of a face; columns: the wanted displacement differences along ab and ac.
         divergence = np.stack([-w_ab, -w_ac, w_ab + w_bc, -w_bc, -w_bc, w_ac + w_bc], axis=1).reshape(-1, 3, 2)
@@ -156,11 +158,9 @@ class DeformationTransfer:
         self._from_held = matrix[free][:, ~free]
         self._factor = Factorization(matrix[free][:, free]) if free.any() else None
 
-    def transfer(self, deltas, base=None, held=None):
+    def transfer(self, deltas, held=None):
         """Carry deltas (k, n, 3) mm of the source to the target: (k, n, 3) mm.
 
-        base (k, n, 3) or (n, 3): the deltas start from source + base instead of the source (a corrective such as
-             mouthClose, which is made on top of jawOpen); the result then starts from the target moved by base likewise
         held (k, n, 3): how the fixed vertices of the target move, known from elsewhere; default: not at all
         """
         deltas = np.asarray(deltas, float)
@@ -172,12 +172,8 @@ class DeformationTransfer:
         if self._factor is None or not len(deltas):
             return result
         rhs = np.empty((int((~self.fixed).sum()), len(deltas), 3))
-        starts = [None] * len(deltas) if base is None else np.broadcast_to(base, deltas.shape)
-        for k, (delta, start) in enumerate(zip(deltas, starts)):
-            if start is None:
-                rhs[:, k] = self._right_hand_side(delta)
-            else:
-                rhs[:, k] = self._right_hand_side(start + delta) - self._right_hand_side(start)
+        for k, delta in enumerate(deltas):
+            rhs[:, k] = self._right_hand_side(delta)
         rhs = rhs.reshape(len(rhs), -1)
         if held is not None:
             known = result[:, self.fixed].transpose(1, 0, 2)
@@ -243,7 +239,7 @@ def _check(source, target, faces, fixed):
         raise ValueError(f"faces: expected (m, 3) into {len(source)} vertices, got {faces.shape}")
 
 
-def deformation_transfer(source, target, faces, deltas, *, fixed=None, links=(), base=None):
+def deformation_transfer(source, target, faces, deltas, *, fixed=None, links=()):
     """Carry per-vertex deltas from one head to another of the same topology (see DeformationTransfer).
 
     source, target (n, 3) mm; faces (m, 3); deltas (k, n, 3) mm from source; not modified
@@ -253,4 +249,4 @@ def deformation_transfer(source, target, faces, deltas, *, fixed=None, links=(),
     deltas = np.asarray(deltas, float)
     if fixed is None:
         fixed = ~deltas.any(axis=(0, 2))
-    return DeformationTransfer(source, target, faces, fixed=fixed, links=links).transfer(deltas, base=base)
+    return DeformationTransfer(source, target, faces, fixed=fixed, links=links).transfer(deltas)

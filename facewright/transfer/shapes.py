@@ -43,21 +43,36 @@ def transfer_shapes(face, options=None):
     options = options or TransferOptions()
     template, V = face.template, face.vertices
     stop = template.skin.vertices[1]
-    faces = template.faces[template.skin.face_slice]
+    faces, weights = even_handed(template.faces[template.skin.face_slice], template.mirror)
     fixed = face.regions["skull"][:stop]
     if not fixed.any():
         fixed = ~template.deltas[:, :stop].any(axis=(0, 2))
     links = feature_links(face.lines, template.vertices, options)
-    skin = DeformationTransfer(template.vertices[:stop], V[:stop], faces, fixed=fixed, links=links)
+    skin = DeformationTransfer(
+        template.vertices[:stop], V[:stop], faces, fixed=fixed, links=links, face_weights=weights
+    )
     result = np.zeros(template.deltas.shape)
-    result[:, :stop] = _with_bases(skin, template.deltas[:, :stop], template.shape_names)
     scale = best_similarity(template.vertices[:stop], V[:stop])[1]
-    _settle(result[:, :stop], template.deltas[:, :stop] @ (scale * skin.rotation.T))
+    result[:, :stop] = _skin_shapes(skin, template.deltas[:, :stop], template.shape_names, scale)
     _carry_bones(template, V, skin.rotation, result)
     if options.contact is not None:
         result = clear_lids(face, result, options.contact)
     _carry_the_rest(template, V, skin.rotation, result)
     return result
+
+
+def even_handed(faces, mirror):
+    """Triangles (m, 3) and weights (m,) that are the same on both sides of a head.
+
+    Quads are cut along one diagonal, on some templates not the mirrored one on the other side. Where a triangle has no
+    twin, it and its mirror image (the other cut of the twin quad) count half each; the rest count once.
+    """
+    n = len(mirror)
+    twins = mirror[faces][:, [0, 2, 1]]
+    keys, twin_keys = (np.sort(F, axis=1) @ [n * n, n, 1] for F in (faces, twins))
+    alone = ~np.isin(twin_keys, keys)
+    weights = np.where(alone, 0.5, 1.0)
+    return np.concatenate([faces, twins[alone]]), np.append(weights, np.full(alone.sum(), 0.5))
 
 
 def feature_links(lines, vertices, options=None):
@@ -75,9 +90,11 @@ def feature_links(lines, vertices, options=None):
 
 
 def _pair_lines(one, other, vertices, weight, by_gap):
-    """Links from each inner vertex of one line to the vertex of the other at the same share of its length."""
-    shares = [_along(vertices[line]) for line in (one, other)]
-    partner = np.abs(shares[0][:, None] - shares[1][None]).argmin(axis=1)
+    """Links from each inner vertex of one line to its partner, else to the vertex at the same share of the length."""
+    partner = np.arange(len(one))
+    if len(one) != len(other):
+        shares = [_along(vertices[line]) for line in (one, other)]
+        partner = np.abs(shares[0][:, None] - shares[1][None]).argmin(axis=1)
     pairs = np.stack([one, other[partner]], axis=1)[1:-1]
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     return Links(pairs, np.full(len(pairs), weight), by_gap)
@@ -89,18 +106,22 @@ def _along(chain):
     return steps / max(steps[-1], 1e-12)
 
 
-def _with_bases(transfer, deltas, names):
-    """(s, n_skin, 3): shapes from the neutral, correctives from the shape they are made on.
+def _skin_shapes(transfer, deltas, names, scale):
+    """(s, n_skin, 3): shapes of the skin; correctives are the difference of the pose with them and the pose without.
 
     What is held should not move under any shape; where a template's does a little, it does so here.
     """
-    held = np.where(transfer.fixed[:, None], deltas @ transfer.rotation.T, 0.0)
-    plain = [i for i, name in enumerate(names) if CORRECTIVE_BASE.get(name) not in names]
-    result = np.zeros(deltas.shape)
-    result[plain] = transfer.transfer(deltas[plain], held=held[plain])
-    for i in sorted(set(range(len(names))) - set(plain)):
-        base = deltas[names.index(CORRECTIVE_BASE[names[i]])]
-        result[i] = transfer.transfer(deltas[i : i + 1], base=base, held=held[i : i + 1])[0]
+    pose = np.array(deltas)
+    bases = {
+        i: names.index(CORRECTIVE_BASE[name]) for i, name in enumerate(names) if CORRECTIVE_BASE.get(name) in names
+    }
+    for i, base in bases.items():
+        pose[i] += deltas[base]
+    expected = pose @ (scale * transfer.rotation.T)
+    result = transfer.transfer(pose, held=expected)
+    _settle(result, expected)
+    for i, base in bases.items():
+        result[i] -= result[base]
     return result
 
 

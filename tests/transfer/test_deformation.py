@@ -148,12 +148,22 @@ def test_shapes_do_not_influence_each_other():
     assert np.allclose(transfer.transfer(deltas[1:])[0], both[1], atol=1e-12)
 
 
-def test_a_corrective_starts_from_its_base():
+def test_held_vertices_move_as_told_and_take_the_rest_along():
     source, target, faces, fixed, deltas = heads()
     transfer = DeformationTransfer(source, target, faces, fixed=fixed)
-    corrective = transfer.transfer(deltas[1:], base=deltas[0])
-    total = transfer.transfer(deltas.sum(axis=0)[None])
-    assert np.allclose(transfer.transfer(deltas[:1]) + corrective, total, atol=1e-10)
+    shift = np.broadcast_to([1.0, 2, 3], target.shape)[None]
+    moved = transfer.transfer(deltas[:1], held=shift)
+    assert np.allclose(moved, transfer.transfer(deltas[:1]) + shift, atol=1e-9)
+
+
+def test_faces_count_by_their_weights():
+    """Twice the faces at half the weight are the same faces; a face of no weight is not there."""
+    source, target, faces, fixed, deltas = heads()
+    plain = DeformationTransfer(source, target, faces, fixed=fixed)
+    twice = DeformationTransfer(
+        source, target, np.vstack([faces, faces]), fixed=fixed, face_weights=np.full(2 * len(faces), 0.5)
+    )
+    assert np.allclose(twice.transfer(deltas), plain.transfer(deltas), atol=1e-9)
 
 
 def with_lash(source, faces):

