@@ -21,10 +21,14 @@ DEEP_MM, DARK = 0.6, 0.06
 
 @dataclass(frozen=True)
 class Crease:
-    """points (k, 3) on the scan from start to end; strength (k,) mm; found: it stands out from its surroundings."""
+    """points (k, 3) on the scan from start to end; strength (k,) mm, how deep it is; forward (3,) towards the viewer.
+
+    found: it stands out from its surroundings
+    """
 
     points: np.ndarray
     strength: np.ndarray
+    forward: np.ndarray
     found: bool
 
 
@@ -82,10 +86,10 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     core = path_strength[start:stop]
     found = bool(len(core) > 8 and np.median(core) > options.min_strength_mm and np.isfinite(points).all())
     if not found:
-        return Crease(line, np.zeros(len(line)), False)
+        return Crease(line, np.zeros(len(line)), R[2], False)
     points, fractions = _resample(points, 0.25)
     strength = np.interp(fractions, np.linspace(0, 1, len(core)), core)
-    return Crease(points @ R + center, strength, True)
+    return Crease(points @ R + center, strength, R[2], True)
 
 
 def _smoothed(height, trust, step_mm):

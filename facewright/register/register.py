@@ -218,7 +218,7 @@ def _leading_lines(scan, template, model, pairs, closed):
         rows = Rows(
             pairs.rows[pairs.by_hand][:, :stop], pairs.points[pairs.by_hand], np.full(pairs.by_hand.sum(), 40.0)
         )
-        leading.append(lambda _vertices: rows)
+        leading.append(lambda _vertices: [rows])
     upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
     middle = 0.5 * (model.vertices[upper] + model.vertices[lower])
     forward = normals[template.regions["lips"][:stop]].mean(axis=0)
@@ -227,9 +227,9 @@ def _leading_lines(scan, template, model, pairs, closed):
     stats["lip_crease_mm"] = float(np.median(crease.strength))
     if crease.found:
         for line in (upper, lower):
-            leading.append(line_rows(line, crease.points, LINE_WEIGHT * crease_trust(crease), stop))
+            leading.append(line_rows(line, crease, LINE_WEIGHT * crease_trust(crease), stop))
         contact = contact_rows(upper[1:-1], lower[1:-1], 30.0, stop)
-        leading.append(lambda _vertices: contact)
+        leading.append(lambda _vertices: [contact])
     for side in SIDES:
         if not closed[side]:
             continue
@@ -246,12 +246,10 @@ def _leading_lines(scan, template, model, pairs, closed):
         )
         stats[f"lid_crease_{side}_mm"] = float(np.median(crease.strength))
         if crease.found:
-            order = slice(None) if side == "left" else slice(None, None, -1)
-            points, trust = crease.points[order], crease_trust(crease)[order]
             for margin in (lid_upper, lid_lower):
-                leading.append(line_rows(margin, points, LINE_WEIGHT * trust, stop))
+                leading.append(line_rows(margin, crease, LINE_WEIGHT * crease_trust(crease), stop))
             contact = contact_rows(*_paired(lid_upper, lid_lower, model.vertices), 10.0, stop)
-            leading.append(lambda _vertices, contact=contact: contact)
+            leading.append(lambda _vertices, contact=contact: [contact])
     return tuple(leading), stats
 
 
