@@ -5,7 +5,8 @@ the lowest profile that a rolling disc of that radius can touch). Where the disc
 one of a disc as big as a lip is the mouth, and smaller discs rolled inside that pocket narrow it down to the line where
 the two lips touch. The sections are seen from the direction in which the big disc rests on both lips, so that an
 overhanging upper lip does not hide the line. A scan that is open there (a ray falls through a slit) makes the pocket
-deeper and nothing else.
+deeper and nothing else. Where a coarse scan has only a wide trough, its darkest line in the texture decides, if it has
+one.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import gaussian_filter1d, median_filter
 
+from facewright.mesh.closest import interpolate
 from facewright.mesh.raster import RayScene
+from facewright.mesh.render import sample_texture
 
 DISCS_MM = (4.0, 1.5, 0.5)
 STEP_MM = 0.05
@@ -23,6 +26,8 @@ WINDOW_MM = 9.0
 FAN_DEG = 35.0
 DEPTH_CAP_MM = 3.0
 FAINT_MM = 0.08
+CLEAR_MM = 0.25
+BESIDE = round(0.5 / STEP_MM)
 
 
 @dataclass(frozen=True)
@@ -42,19 +47,26 @@ class Crease:
     across: np.ndarray
 
 
-def find_crease(vertices, faces, corner_right, corner_left, *, stations=61, margin=0.06, up=(0.0, 1.0, 0.0)):
+def find_crease(
+    vertices, faces, corner_right, corner_left, *, brightness=None, stations=61, margin=0.06, up=(0.0, 1.0, 0.0)
+):
     """The Crease of a scan (vertices (n, 3), faces (m, 3)) between two roughly known mouth corners (3,).
 
-    margin is the share of the width that is left out at either corner; up (3,) roughly
+    brightness  function (faces (k,), barycentric (k, 3)) -> (k,), asked where the crease is a wide trough; or None
+    margin      share of the width that is left out at either corner; up (3,) roughly
     """
     scene = RayScene(vertices, faces)
     sections = _fan(np.asarray(corner_right, float), np.asarray(corner_left, float), np.asarray(up, float))
     origins, outward, upward, across = sections(np.linspace(margin, 1 - margin, stations), np.zeros(stations))
-    tilt = np.array([_tilt(_profile(scene, *frame)) for frame in zip(origins, outward, upward)])
+    tilt = np.array([_tilt(_profile(scene, *frame)[0]) for frame in zip(origins, outward, upward)])
     t = np.linspace(-1, 1, stations)
     tilt = np.polyval(np.polyfit(t, median_filter(tilt, 15, mode="nearest"), 2), t)
     origins, outward, upward, across = sections(np.linspace(margin, 1 - margin, stations), tilt)
-    found = [_locate(_profile(scene, *frame)) for frame in zip(origins, outward, upward)]
+    found = []
+    for frame in zip(origins, outward, upward):
+        depth, hits = _profile(scene, *frame)
+        light = None if brightness is None else _light(hits, brightness)
+        found.append(_locate(depth, light))
     height, depth, strength = np.array(found).T
     smooth = median_filter(height, 9, mode="nearest")
     sure = (strength > FAINT_MM) & (np.abs(height - smooth) < 0.8)
@@ -86,7 +98,8 @@ def measure_seam(scan, fit, lines, *, scale=1.0):
     scan a data.Scan in the fit's frame; fit (n, 3); lines as in Face.lines
     """
     seam = (fit[lines["lip_seam_upper"]] + fit[lines["lip_seam_lower"]]) / 2
-    crease = find_crease(scan.vertices * scale, scan.faces, seam[0] * scale, seam[-1] * scale)
+    ends = seam[0] * scale, seam[-1] * scale
+    crease = find_crease(scan.vertices * scale, scan.faces, *ends, brightness=scan_brightness(scan))
     offsets = seam_offsets_mm(crease, seam * scale)
     known = offsets[np.isfinite(offsets)]
     return {
@@ -118,10 +131,37 @@ def _heights():
 
 
 def _profile(scene, origin, outward, up):
-    """(h,) how far out the scan is at each height of a section, mm from origin; -inf where there is none."""
+    """(h,) how far out the scan is at each height of a section, mm from origin, -inf where there is none; the Hits."""
     starts = origin + _heights()[:, None] * up + 60.0 * outward
     hits = scene.cast(starts, np.broadcast_to(-outward, starts.shape))
-    return 60.0 - hits.distance
+    return 60.0 - hits.distance, hits
+
+
+def _light(hits, brightness):
+    """(h,) brightness along a section, smoothed over half a millimetre; 1 where there is no surface."""
+    light = np.ones(len(hits.face))
+    seen = hits.face >= 0
+    light[seen] = brightness(hits.face[seen], hits.barycentric[seen])
+    return gaussian_filter1d(light, 0.25 / STEP_MM, mode="nearest")
+
+
+def scan_brightness(scan):
+    """The brightness function of a data.Scan with texture or colours; None for clay."""
+    if scan.colors is not None:
+        return lambda faces, barycentric: interpolate(scan.colors, scan.faces, faces, barycentric).mean(axis=1)
+    if not scan.has_texture:
+        return None
+    image_of = np.zeros(len(scan.faces), np.int64) if scan.face_texture is None else scan.face_texture
+
+    def brightness(faces, barycentric):
+        result = np.ones(len(faces))
+        for number, image in enumerate(scan.textures):
+            mine = image_of[faces] == number
+            uv = interpolate(scan.uv, scan.uv_faces, faces[mine], barycentric[mine])
+            result[mine] = sample_texture(image, uv)[:, :3].mean(axis=1) / 255.0
+        return result
+
+    return brightness
 
 
 def _close(depth, radius):
@@ -164,19 +204,31 @@ def _tilt(depth):
     return float(np.clip(np.arctan2(depth[start] - depth[stop], rise), -0.44, 0.44))
 
 
-def _locate(depth):
-    """height, depth and strength (mm) of the crease in one section."""
+def _locate(depth, light=None):
+    """height, depth and strength (mm) of the crease in one section.
+
+    A smaller disc has a say only where it finds a pocket of its own: in a wide trough (a coarse scan) its finds are the
+    kinks between facets, and the middle of the big disc's pocket, or what is dark there, is the better answer.
+    """
     depth = _capped(depth)
-    start, stop, strength = 0, len(depth), 0.0
-    for radius in DISCS_MM:
-        closed = _close(depth, radius)
-        gap = (closed - depth)[start:stop]
-        if gap.max() < 1e-3:
+    closed = _close(depth, DISCS_MM[0])
+    strength = float((closed - depth).max())
+    start, stop = _pocket(depth, closed, 0, len(depth))
+    trough = True
+    for radius in DISCS_MM[1:]:
+        finer = _close(depth, radius)
+        if (finer - depth)[start:stop].max() < CLEAR_MM:
             break
-        strength = max(strength, float(gap.max()))
+        closed, trough = finer, False
         start, stop = _pocket(depth, closed, start, stop)
-    gap = (closed - depth)[start:stop] ** 2
-    middle = start + (gap @ np.arange(stop - start)) / gap.sum() if gap.sum() > 0 else (start + stop - 1) / 2
-    height = _heights()[0] + middle * STEP_MM
+    if trough and light is not None:
+        start, stop = max(start - BESIDE, 0), min(stop + BESIDE, len(depth))
+    gap = (closed - depth)[start:stop]
+    # In a trough the middle of the pocket, in a crease its bottom, not the middle of its slopes.
+    weight = gap if trough else np.maximum(gap - 0.7 * gap.max(), 0.0)
+    if trough and light is not None:
+        shade = light[start:stop]
+        weight = np.maximum(shade.min() + 0.2 * (shade.max() - shade.min()) - shade, 0.0)
+    middle = start + (weight @ np.arange(stop - start)) / weight.sum() if weight.sum() > 0 else (start + stop - 1) / 2
     rim = (depth[max(start - 1, 0)] + depth[min(stop, len(depth) - 1)]) / 2
-    return height, rim, strength
+    return _heights()[0] + middle * STEP_MM, rim, strength

@@ -74,3 +74,20 @@ def test_smooth_skin_has_no_sure_crease():
     flat[:, 2] = 60.0 - flat[:, 0] ** 2 / 60.0
     crease = seam.find_crease(flat, faces, *corners(vertices, bow))
     assert not crease.sure.any()
+
+
+def test_in_a_wide_trough_the_dark_line_decides():
+    vertices, faces = lips(bow)
+    t = vertices[:, 1] - bow(vertices[:, 0])
+    trough = vertices.copy()
+    trough[:, 2] = 60.0 - vertices[:, 0] ** 2 / 60.0 + 0.35 * np.maximum(np.abs(t - 0.6) - 1.5, 0.0)
+    dark = np.where(np.abs(t) < 0.25, 0.2, 0.8)
+
+    def brightness(at, barycentric):
+        return (dark[faces[at]] * barycentric).sum(axis=1)
+
+    ends = corners(vertices, bow)
+    by_shape = seam.seam_offsets_mm(seam.find_crease(trough, faces, *ends), true_line())
+    by_light = seam.seam_offsets_mm(seam.find_crease(trough, faces, *ends, brightness=brightness), true_line())
+    assert np.nanmedian(by_shape) > 0.4  # the middle of the trough
+    assert np.nanpercentile(by_light, 95) < 0.2
