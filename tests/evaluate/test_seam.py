@@ -80,7 +80,8 @@ def test_in_a_wide_trough_the_dark_line_decides():
     vertices, faces = lips(bow)
     t = vertices[:, 1] - bow(vertices[:, 0])
     trough = vertices.copy()
-    trough[:, 2] = 60.0 - vertices[:, 0] ** 2 / 60.0 + 0.8 * np.maximum(np.abs(t - 0.6) - 1.5, 0.0)
+    walls = 0.8 * np.clip(np.abs(t - 0.6) - 1.5, 0.0, 4.0)
+    trough[:, 2] = 60.0 - vertices[:, 0] ** 2 / 60.0 + walls
     dark = np.where(np.abs(t) < 0.25, 0.2, 0.8)
 
     def brightness(at, barycentric):
