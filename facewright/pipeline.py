@@ -23,6 +23,7 @@ from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_la
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
 from facewright.transfer import transfer_shapes
+from facewright.write.credits import write_credits
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
 from facewright.write.preview import write_preview
@@ -247,6 +248,7 @@ def _write(rig, maps, scan, face, out, options):
         write_gltf(rig, out / "rig.glb")
     if "obj" in options.formats:
         write_obj(rig, out / "obj")
+    write_credits(rig, out / "CREDITS.txt")
     write_rig(rig, out / "rig")
     write_textures(maps, out / "textures", describe_maps(face, maps))
     write_preview(rig, scan, face, out / "preview.png", options.jobs)

@@ -46,8 +46,8 @@ class RegisterOptions:
 
 # (w_bend, w_stretch, tau mm, reach mm) per level; tuned on heads with known truth (bench/registration_truth.py):
 # lower final stiffness gains distance and loses correspondence, so the last levels only take up the scan's detail.
-LEVELS = tuple((w, w / 5, 3.0, 10.0) for w in (100.0, 45.0, 20.0, 10.0, 5.0))
-DETAIL = ((2.0, 0.4, 1.5, 4.0),)
+LEVELS = tuple((w, w / 2, 3.0, 10.0) for w in (45.0, 20.0, 10.0, 5.0))
+DETAIL = ((2.0, 0.5, 1.5, 4.0),)
 
 
 def register(scan, landmarks, template, options=None, placed=()):
@@ -183,7 +183,8 @@ def _fit_model(template, target, pairs, closed, options):
     rules = skin_rules(template)
     trust = np.zeros(len(template.vertices))
     trust[:stop] = rules.trust
-    trust[~template.regions["face"]] *= 0.3
+    ears = template.regions["ear_left"] | template.regions["ear_right"]
+    trust[~template.regions["face"] & ~ears] *= 0.3
     trust[template.regions["scalp"]] = 0.0  # it may be hair
     model = fit_model(
         template.vertices,

@@ -18,8 +18,8 @@ from facewright.register.nonrigid import ElasticSkin, Rows
 REGION_RULES = {
     "scalp": (10.0, 4.0, 3.0, 0.5),
     "neck": (8.0, 3.0, 3.0, 0.5),
-    "ear_left": (5.0, 5.0, 8.0, 0.3),
-    "ear_right": (5.0, 5.0, 8.0, 0.3),
+    "ear_left": (5.0, 5.0, 6.0, 0.5),
+    "ear_right": (5.0, 5.0, 6.0, 0.5),
 }
 # Hair may begin this far from eyes, lips and nostrils.
 HAIR_FROM_MM = 32.0
@@ -69,7 +69,8 @@ def skin_rules(template):
     features = regions["eyes"] | regions["lips"] | regions["nostrils"]
     away = cKDTree(vertices[features]).query(vertices)[0] > HAIR_FROM_MM
     above = vertices[:, 1] > vertices[regions["eyes"], 1].mean()
-    hairy = regions["outer"] & away & (above | ~regions["face"])
+    ears = regions["ear_left"] | regions["ear_right"]
+    hairy = regions["outer"] & away & (above | ~regions["face"]) & ~ears
     outward[hairy & regions["face"]] = 5.0
     return SkinRules(trust, stiffness, inward, outward, hairy)
 
