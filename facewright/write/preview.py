@@ -44,11 +44,11 @@ def write_preview(rig, scan, face, path, jobs=2):
 def preview_sheet(rig, scan, face, jobs=2):
     """The contact sheet as (h, w, 3) uint8."""
     scenes = {
-        "scan": Scene(_scan_drawables(scan, textured=True)),
-        "rig": Scene(_rig_drawables(rig, textured=True)),
-        "scan clay": Scene(_scan_drawables(scan, textured=False)),
-        "rig clay": Scene(_rig_drawables(rig, textured=False)),
-        "fit": Scene([_heat_drawable(scan, face)]),
+        "scan": Scene(scan_drawables(scan, textured=True)),
+        "rig": Scene(rig_drawables(rig, textured=True)),
+        "scan clay": Scene(scan_drawables(scan, textured=False)),
+        "rig clay": Scene(rig_drawables(rig, textured=False)),
+        "fit": Scene([heat_drawable(scan, face)]),
     }
     wanted = [(name, view, camera) for name in scenes for view, camera in _head_cameras(rig).items()]
     for name in scenes:
@@ -94,7 +94,7 @@ def _close_up_section(pictures, face):
 
 
 def _fit_section(pictures):
-    legend = color_bar(_heat_colors(np.linspace(0, HEAT_LIMIT_MM, 64)), ("0 mm", "0.25", f"{HEAT_LIMIT_MM} and more"))
+    legend = color_bar(heat_colors(np.linspace(0, HEAT_LIMIT_MM, 64)), ("0 mm", "0.25", f"{HEAT_LIMIT_MM} and more"))
     cells = tuple(Cell(pictures["fit", view], view) for view in (*VIEWS, "eyes", "mouth"))
     return Section("Distance from the fit to the scan", (cells,), "grey where the scan shows nothing", legend)
 
@@ -110,10 +110,10 @@ def _shape_cell(rig, target, camera):
     name = "neutral" if target < 0 else rig.target_names[target]
     if name == "mouthClose" and "jawOpen" in rig.target_names:
         targets, name = (target, rig.target_names.index("jawOpen")), "mouthClose + jawOpen"
-    return Cell(_picture(Scene(_rig_drawables(rig, textured=False, targets=targets)), camera), name)
+    return Cell(_picture(Scene(rig_drawables(rig, textured=False, targets=targets)), camera), name)
 
 
-def _scan_drawables(scan, textured):
+def scan_drawables(scan, textured):
     """The scan as one Drawable, or one for each of its textures."""
     if textured and scan.has_texture:
         number = np.zeros(len(scan.faces), int) if scan.face_texture is None else scan.face_texture
@@ -129,7 +129,7 @@ def _scan_drawables(scan, textured):
     return [Drawable(scan.vertices, scan.faces)]
 
 
-def _rig_drawables(rig, textured, targets=()):
+def rig_drawables(rig, textured, targets=()):
     """A Drawable per mesh of the rig under targets at weight 1. Clay keeps the colours of eyes, teeth and tongue."""
     drawables = []
     for mesh in rig.meshes:
@@ -160,7 +160,7 @@ def _clay_with_dark_inside(rig):
     return color
 
 
-def _heat_drawable(scan, face):
+def heat_drawable(scan, face):
     """The fit, coloured by its distance to the scan."""
     skin = face.template.skin
     n = skin.vertices[1]
@@ -169,11 +169,11 @@ def _heat_drawable(scan, face):
     color = np.tile(srgb_to_linear(np.array(NOT_SEEN) / 255.0), (n, 1))
     if shown.any():
         distance = Surface(scan.vertices, scan.faces).closest(fit[shown]).distance
-        color[shown] = srgb_to_linear(_heat_colors(distance) / 255.0)
+        color[shown] = srgb_to_linear(heat_colors(distance) / 255.0)
     return Drawable(fit, faces, color=color)
 
 
-def _heat_colors(distance):
+def heat_colors(distance):
     """(k, 3) uint8 of distances (k,) mm."""
     place = np.clip(distance / HEAT_LIMIT_MM, 0.0, 1.0) * (len(HEAT_STOPS) - 1)
     stops = np.arange(len(HEAT_STOPS))
