@@ -18,10 +18,10 @@ def tuck_interior(vertices, faces, interior, outer, rounds=4):
     """Vertices (n, 3) with those of the interior that came through the skin moved back behind it.
 
     interior, outer (n,) bool. An interior vertex in front of the nearest outer face, or nearer than CLEARANCE_MM
-    behind it, is pushed back; its neighbours follow smoothly; outer vertices do not move. The first ring behind a rim
-    is left alone: there inside and outside meet.
+    behind it, is pushed back; its neighbours follow smoothly; outer vertices do not move. The ring behind a rim is left
+    alone: there inside and outside meet.
     """
-    seam = dilate(outer, faces, 2)
+    seam = dilate(outer, faces, 1)
     loose = np.flatnonzero(interior & ~seam)
     if not len(loose):
         return vertices

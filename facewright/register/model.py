@@ -20,8 +20,9 @@ from facewright.mesh.normals import vertex_normals
 class ModelOptions:
     """sigma_mm: what the identity modes cannot explain; n_effective: independent observations that the scan counts as.
 
-    iterations of the surface stage; landmark_sigma_mm: how well a landmark is placed; landmark_floor: the share of their
-    pull that landmarks keep to the end (0.05, 0.2, 0.3, 1 tried: ICT lips 2.1, 1.7, 1.6, 1.1 mm, hm08 face 0.85 to 0.99)
+    iterations of the surface stage; landmark_sigma_mm: how well a landmark is placed; landmark_floor: the share
+    of their pull that landmarks keep to the end (0.05, 0.3 and 1 tried: lips of ICT heads 2.1, 1.6, 1.1 mm, but the
+    face of hm08 heads 0.85, 0.90, 0.99)
     """
 
     sigma_mm: float = 0.7

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from facewright.mesh.adjacency import dilate
+from facewright.register.lines import arc_fractions
 from facewright.register.nonrigid import ElasticSkin, Rows
 
 # Less than this of a shape is taken for the person's own rest face.
@@ -13,6 +14,7 @@ REMOVE_FROM = 0.25
 # A vertex that moves less than this (mm) under the removed shapes keeps what the scan says of it; beyond, the model at
 # rest gives its place and only the smooth part of the person's own shape is carried on.
 KEEP_MM = 0.8
+HOLD_FROM_MM = 22.0
 
 
 def take_out_expression(template, model, fit_skin, expression):
@@ -42,4 +44,29 @@ def take_out_expression(template, model, fit_skin, expression):
     weights = np.where(inside, 0.0, np.exp(-((moved / KEEP_MM) ** 2)))
     skin = ElasticSkin(rest, faces)
     rows = Rows(sp.identity(n, format="csr"), fit_skin - way, 1e3 * weights * skin.mass)
-    return rest + skin.solve((rows,), 1.0, 0.2, 1e-4, tolerance=1e-6, max_iterations=10), removed
+    opened = rest + skin.solve((rows,), 1.0, 0.2, 1e-4, tolerance=1e-6, max_iterations=10)
+    for side in ("Left", "Right"):
+        if f"eyeBlink{side}" in removed:
+            opened = _template_aperture(template, opened, faces, side.lower())
+    return opened, removed
+
+
+def _template_aperture(template, skin, faces, side):
+    """Skin (n, 3) whose lids open as far, for the width of the eye, as the template's; shut lids do not tell."""
+    upper, lower = template.lines[f"lid_upper_{side}"], template.lines[f"lid_lower_{side}"]
+    over = np.interp(arc_fractions(skin[upper]), arc_fractions(skin[lower]), np.arange(len(lower)))
+    partner = lower[np.rint(over).astype(int)]
+    opening = [np.linalg.norm(v[upper] - v[partner], axis=1).max() for v in (skin, template.vertices)]
+    width = [np.linalg.norm(v[upper[0]] - v[upper[-1]]) for v in (skin, template.vertices)]
+    excess = 1.0 - opening[1] * width[0] / width[1] / max(opening[0], 1e-6)
+    # The lower lid stays: on shut eyes it is where it was.
+    n = len(skin)
+    near = np.linalg.norm(skin - skin[upper].mean(axis=0), axis=1)
+    hold = np.where(near > HOLD_FROM_MM, 1e3, 0.0)
+    hold[lower] = 1e3
+    pull = np.zeros((n, 3))
+    pull[upper] = excess * (skin[partner] - skin[upper])
+    hold[upper] = 1e3
+    elastic = ElasticSkin(skin, faces)
+    rows = Rows(sp.identity(n, format="csr"), skin + pull, hold * elastic.mass)
+    return skin + elastic.solve((rows,), 1.0, 0.2, 1e-4, tolerance=1e-6, max_iterations=10)
