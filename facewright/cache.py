@@ -8,11 +8,14 @@ import os
 import shutil
 import tempfile
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from facewright.errors import InputError
 
 FORMAT = 1
 
@@ -65,31 +68,48 @@ class StageStore:
         """The StageResult stored under this name and key, or None if there is none or it is damaged."""
         folder = self.folder / name
         try:
-            meta = json.loads((folder / "stage.json").read_text())
-            if meta["format"] != FORMAT or meta["key"] != key:
+            meta = json.loads((folder / "stage.json").read_text(encoding="utf-8"))
+            if meta["format"] != FORMAT or meta["key"] != key or fingerprint(meta["info"]) != meta["info_sha256"]:
                 return None
             if file_digest(folder / "arrays.npz") != meta["arrays_sha256"]:
                 return None
             with np.load(folder / "arrays.npz", allow_pickle=False) as archive:
                 arrays = {field: archive[field] for field in archive.files}
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        except (OSError, KeyError, TypeError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
             return None
         return StageResult(arrays, meta["info"], meta["seconds"], True)
 
-    def save(self, name, key, arrays, info, seconds):
-        """Store a stage; a reader sees the old one or the new one, never half of it."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=self.folder))
+    def last_info(self, name):
+        """The info last stored under this name, whatever its key; {} if there is none that can be read."""
         try:
-            with open(temporary / "arrays.npz", "wb") as stream:
-                np.savez(stream, **arrays)
-            digest = file_digest(temporary / "arrays.npz")
-            meta = {"format": FORMAT, "key": key, "arrays_sha256": digest, "seconds": seconds, "info": info}
-            (temporary / "stage.json").write_text(json.dumps(meta, indent=1, sort_keys=True))
-            self._swap(temporary, self.folder / name)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+            info = json.loads((self.folder / name / "stage.json").read_text(encoding="utf-8"))["info"]
+        except (OSError, KeyError, TypeError, ValueError):
+            return {}
+        return info if isinstance(info, dict) else {}
+
+    def save(self, name, key, arrays, info, seconds):
+        """Store a stage; a reader sees the old one or the new one, never half of it. Returns what load would give."""
+        info = json.loads(json.dumps(info))
+        meta = {"format": FORMAT, "key": key, "seconds": seconds, "info": info, "info_sha256": fingerprint(info)}
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            temporary = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=self.folder))
+            try:
+                self._fill(temporary, arrays, meta)
+                self._swap(temporary, self.folder / name)
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
+        except OSError as error:
+            raise InputError(
+                f"stages: cannot write {self.folder / name} ({error.strerror}); make room or choose another --out"
+            ) from error
         return StageResult(arrays, info, seconds, False)
+
+    def _fill(self, folder, arrays, meta):
+        with open(folder / "arrays.npz", "wb") as stream:
+            np.savez(stream, **arrays)
+        meta = meta | {"arrays_sha256": file_digest(folder / "arrays.npz")}
+        (folder / "stage.json").write_text(json.dumps(meta, indent=1, sort_keys=True), encoding="utf-8")
 
     def _swap(self, temporary, final):
         trash = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -15,9 +14,11 @@ from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
+from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
 from facewright.parts import build_rig, fit_parts
 from facewright.read import read_scan
+from facewright.read.named import named_files
 from facewright.register import RegisterOptions, register
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
@@ -27,7 +28,7 @@ from facewright.write.credits import write_credits
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
 from facewright.write.preview import write_preview
-from facewright.write.report import build_report, peak_memory_mb, write_json
+from facewright.write.report import build_report, peak_memory_mb, plain, write_json
 from facewright.write.rig import write_rig
 from facewright.write.textures import write_textures
 
@@ -77,37 +78,43 @@ class JobOptions:
     jobs: int = 2
     from_stage: str | None = None
 
+    def __post_init__(self):
+        if self.eyes not in ("template", "as-scanned"):
+            raise ValueError(f"eyes is 'template' or 'as-scanned', got {self.eyes!r}")
+        if self.shapes != "apple":
+            raise ValueError(f"shapes is 'apple', got {self.shapes!r}")
+        if not self.formats or not set(self.formats) <= {"glb", "obj"}:
+            raise ValueError(f"formats are glb and obj, got {self.formats!r}")
+        if self.texture_size < 1 or self.jobs < 1:
+            raise ValueError(f"texture_size and jobs are 1 or more, got {self.texture_size} and {self.jobs}")
+
 
 class _Run:
     """The stages of one run: looks each up in the cache, times it, reports progress."""
 
-    def __init__(self, store, progress, from_stage):
-        self.store, self.progress = store, progress
-        self.rerun_from = STAGES.index(_stage_name(from_stage)) if from_stage else len(STAGES)
+    def __init__(self, store, progress, rerun_from):
+        self.store, self.progress, self.rerun_from = store, progress, rerun_from
         self.key = fingerprint("facewright", __version__)
         self.seconds, self.reused, self.done = {}, {}, 0.0
         self.started = time.perf_counter()
 
-    def stage(self, name, work, *depends):
-        """Arrays and info of a stage: from disk if nothing it depends on changed, else from work()."""
+    def stage(self, name, work, *depends, intact=lambda info: True):
+        """Arrays and info of a stage: from disk if nothing it depends on changed and it is intact, else from work()."""
         self.key = fingerprint(self.key, name, *depends)
         self.tell(name, "")
         cached = None
         if STAGES.index(name) < self.rerun_from:
             cached = self.store.load(name, self.key)
+            cached = cached if cached is not None and intact(cached.info) else None
         else:
             self.rerun_from = STAGES.index(name)
         if cached is None:
             start = time.perf_counter()
             arrays, info = work()
             cached = self.store.save(name, self.key, arrays, info, round(time.perf_counter() - start, 3))
-        self.finish(name, cached.seconds, cached.reused)
-        return cached.arrays, cached.info
-
-    def finish(self, name, seconds, reused):
-        """Note a stage's end."""
-        self.seconds[name], self.reused[name] = seconds, reused
+        self.seconds[name], self.reused[name] = cached.seconds, cached.reused
         self.done += STAGE_SHARE[name]
+        return cached.arrays, cached.info
 
     def tell(self, name, message):
         """Progress: stage, its number, share done, seconds left or None."""
@@ -117,38 +124,41 @@ class _Run:
             self.progress(name, STAGES.index(name) + 1, len(STAGES), left, message)
 
 
-def _stage_name(word):
-    matches = [stage for stage in STAGES if word in (stage, stage.split("-", 1)[1], stage.split("-", 1)[0])]
-    if not matches:
-        names = ", ".join(stage.split("-", 1)[1] for stage in STAGES)
-        raise InputError(f"--from {word}: there is no such stage; the stages are {names}")
-    return matches[0]
+def _stage_number(word):
+    """Index of a stage named "register", "03" or "03-register"; what lies past the last one for None."""
+    if word is None:
+        return len(STAGES)
+    for number, stage in enumerate(STAGES):
+        if word in (stage, *stage.split("-", 1)):
+            return number
+    names = ", ".join(stage.split("-", 1)[1] for stage in STAGES)
+    raise InputError(f"--from {word}: there is no such stage; the stages are {names}")
 
 
 def rig_job(path, out, options=None, progress=None):
-    """Run the whole job: read path, write the rig into the folder out.
+    """Run the whole job: read the scan at path, write the rig into the folder out.
 
+    options   JobOptions
     progress  function (stage, number, count, seconds_left or None, message), or None
     returns   the report as a dict (what report.json holds)
     raises    InputError for input that cannot be used: nothing half-written is left behind
     """
     options = options or JobOptions()
-    out = Path(out)
+    rerun_from = _stage_number(options.from_stage)
     inputs = _input_digests(path, options)
     folder = find_template(options.template)
-    created = _prepare_folder(out)
+    output = OutputFolder(out)
+    store = StageStore(output.make())
+    store.sweep()
+    run = _Run(store, progress, rerun_from)
     try:
-        return _run_job(Path(path), out, options, inputs, folder, progress)
+        return _run_job(run, Path(path), output, options, inputs, folder)
     except InputError:
-        if created:
-            shutil.rmtree(out, ignore_errors=True)
+        output.remove_what_is_new()
         raise
 
 
-def _run_job(path, out, options, inputs, folder, progress):
-    store = StageStore(out / "stages")
-    store.sweep()
-    run = _Run(store, progress, options.from_stage)
+def _run_job(run, path, output, options, inputs, folder):
     scan, clean_stats = _read(run, path, options, inputs)
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     run.tell("03-register", "reading the template")
@@ -157,18 +167,12 @@ def _run_job(path, out, options, inputs, folder, progress):
     face = _parts(run, face, template)
     deltas = _transfer(run, face, template)
     maps = _bake(run, scan, face, options)
-    started = time.perf_counter()
-    run.tell("07-write", "")
-    rig = build_rig(face, deltas, maps)
-    rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
-    report = build_report(scan, face, rig, clean_stats, pose_info)
-    _write(rig, maps, scan, face, out, options)
-    run.finish("07-write", round(time.perf_counter() - started, 3), False)
+    report = _write(run, scan, face, deltas, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
     report["reused"] = run.reused
     report["peak_memory_mb"] = peak_memory_mb()
-    report["options"] = asdict(options) | {"formats": list(options.formats)}
-    write_json(report, out / "report.json")
+    report["options"] = plain(asdict(options))
+    write_json(report, output.folder / "report.json")
     return report
 
 
@@ -180,7 +184,7 @@ def _read(run, path, options, inputs):
         arrays, info = pack_scan(scan)
         return arrays, info | {"clean": stats}
 
-    arrays, info = run.stage("01-read", work, inputs["scan"], options.units)
+    arrays, info = run.stage("01-read", work, path.stem, inputs["scan"], options.units)
     return unpack_scan(arrays, info), info["clean"]
 
 
@@ -243,15 +247,34 @@ def _bake(run, scan, face, options):
     return arrays
 
 
-def _write(rig, maps, scan, face, out, options):
+def _write(run, scan, face, deltas, maps, found, output, options):
+    """Write all results but report.json; returns the report without what differs from run to run."""
+
+    def work():
+        rig = build_rig(face, deltas, maps)
+        rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
+        report = plain(build_report(scan, face, rig, *found))
+        earlier = run.store.last_info("07-write").get("files", {})
+        with output.workshop() as folder:
+            write_results(rig, maps, scan, face, folder, options)
+            return {}, {"report": report, "files": output.publish(folder, earlier)}
+
+    def intact(info):
+        return output.holds(info["files"])
+
+    return run.stage("07-write", work, sorted(options.formats), intact=intact)[1]["report"]
+
+
+def write_results(rig, maps, scan, face, folder, options):
+    """Every file of a result but report.json and stages/."""
     if "glb" in options.formats:
-        write_gltf(rig, out / "rig.glb")
+        write_gltf(rig, folder / "rig.glb")
     if "obj" in options.formats:
-        write_obj(rig, out / "obj")
-    write_credits(rig, out / "CREDITS.txt")
-    write_rig(rig, out / "rig")
-    write_textures(maps, out / "textures", describe_maps(face, maps))
-    write_preview(rig, scan, face, out / "preview.png", options.jobs)
+        write_obj(rig, folder / "obj")
+    write_credits(rig, folder / "CREDITS.txt")
+    write_rig(rig, folder / "rig")
+    write_textures(maps, folder / "textures", describe_maps(face, maps))
+    write_preview(rig, scan, face, folder / "preview.png", options.jobs)
 
 
 def _rig_to_scan(scan):
@@ -271,24 +294,7 @@ def _input_digests(path, options) -> dict[str, Any]:
             digests[what] = file_digest(file)
         except OSError as error:
             raise InputError(f"{what}: cannot read {file}: {error.strerror}; check the path") from error
-    # What an OBJ names (materials, images) lies beside it: its own bytes do not change when they do.
-    beside = sorted(Path(path).parent.glob("*")) if Path(path).suffix.lower() in (".obj", ".gltf") else []
-    named = [
-        file for file in beside if file.suffix.lower() in (".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".bin")
-    ]
-    digests["scan"] = [digests["scan"], digests["albedo"], digests["normal_map"]]
-    digests["scan"] += [[file.name, file_digest(file)] for file in named if file.is_file()]
+    # What an OBJ or glTF names (materials, images) lies beside it: its own bytes do not change when they do.
+    named = [[file.name, file_digest(file)] for file in named_files(path)]
+    digests["scan"] = [digests["scan"], digests["albedo"], digests["normal_map"], named]
     return digests
-
-
-def _prepare_folder(out):
-    """Make the output folder; True if it was made now."""
-    created = not out.exists()
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        probe = out / ".facewright-write-test"
-        probe.write_bytes(b"")
-        probe.unlink()
-    except OSError as error:
-        raise InputError(f"output folder {out}: cannot write there ({error.strerror}); choose another --out") from error
-    return created

@@ -14,13 +14,18 @@ DESCRIPTION = """Facewright turns one neutral 3D scan of a head into a face rig 
   facewright demo"""
 
 
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong with a command in one line, as everything else does."""
+
+    def error(self, message):
+        self.exit(2, f"facewright: {message}; '{self.prog} --help' shows how\n")
+
+
 def build_parser():
     """The parser of all commands; a command's module is imported only for its own arguments and run."""
     from facewright.cli import demo, evaluate, rig, template
 
-    parser = argparse.ArgumentParser(
-        prog="facewright", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = Parser(prog="facewright", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--version", action="version", version=f"facewright {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, module in (("rig", rig), ("demo", demo), ("template", template), ("evaluate", evaluate)):

@@ -1,10 +1,9 @@
 """The main job on the embedded sample: a head that the project made itself, with the faults of a real scan.
 
-  facewright demo            # writes into demo/
+facewright demo            # writes into demo/
 """
 
-from facewright.cli.progress import ProgressLine
-from facewright.cli.rig import add_job_arguments, summarise
+from facewright.cli.rig import add_job_arguments, run_job
 
 HELP = "the main job on the embedded sample"
 
@@ -17,11 +16,6 @@ def add_arguments(parser):
 
 def run(options):
     """Run the job on the sample."""
-    from facewright.pipeline import JobOptions, rig_job
     from facewright.sample import sample_path
 
-    fields = {name: getattr(options, name) for name in JobOptions.__dataclass_fields__ if hasattr(options, name)}
-    progress = ProgressLine(options.quiet)
-    report = rig_job(sample_path(), options.out, JobOptions(**fields), progress)
-    progress.finish()
-    summarise(report, options.out)
+    run_job(sample_path(), options)

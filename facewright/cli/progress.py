@@ -21,6 +21,12 @@ class ProgressLine:
         sys.stderr.write(f"[{number}/{count}] {name:<10}{left} ...")
         sys.stderr.flush()
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.finish()
+
     def _close(self):
         if self.stage is not None:
             sys.stderr.write(f" {time.perf_counter() - self.started:.1f} s\n")

@@ -10,6 +10,9 @@ stages/ (so that a stopped or changed run goes on where it was). Look at preview
 
 from __future__ import annotations
 
+import argparse
+from pathlib import Path
+
 from facewright.cli.progress import ProgressLine
 from facewright.conventions import MM_PER_UNIT
 
@@ -20,7 +23,9 @@ UPS = ("x", "y", "z", "-x", "-y", "-z")
 def add_job_arguments(parser):
     """Options that `rig` and `demo` share."""
     parser.add_argument("--template", default="hm08", metavar="NAME|FOLDER", help="template to fit (default: hm08)")
-    parser.add_argument("--texture-size", type=_texture_size, default=2048, metavar="N", help="pixels (default: 2048)")
+    parser.add_argument(
+        "--texture-size", type=_texture_size, default=2048, metavar="N", help="side of the maps, pixels (default: 2048)"
+    )
     parser.add_argument(
         "--eyes",
         choices=("template", "as-scanned"),
@@ -31,7 +36,9 @@ def add_job_arguments(parser):
         "--formats", type=_formats, default=("glb",), metavar="LIST", help="glb, obj, comma-separated (default: glb)"
     )
     parser.add_argument("--shapes", choices=("apple",), default="apple", help="apple: exactly the 52 ARKit shapes")
-    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="threads; the result does not depend on it")
+    parser.add_argument(
+        "--jobs", type=_jobs, default=2, metavar="N", help="threads (default: 2); the result does not depend on it"
+    )
     parser.add_argument(
         "--from",
         dest="from_stage",
@@ -56,28 +63,33 @@ def add_arguments(parser):
 
 def run(options):
     """Run the job and say where to look."""
+    run_job(options.scan, options)
+
+
+def run_job(scan, options):
+    """Run the job on a scan with parsed options, show its progress, print what it found."""
     from facewright.pipeline import JobOptions, rig_job
 
     fields = {name: getattr(options, name) for name in JobOptions.__dataclass_fields__ if hasattr(options, name)}
-    progress = ProgressLine(options.quiet)
-    report = rig_job(options.scan, options.out, JobOptions(**fields), progress)
-    progress.finish()
+    with ProgressLine(options.quiet) as progress:
+        report = rig_job(scan, options.out, JobOptions(**fields), progress)
     summarise(report, options.out)
 
 
 def summarise(report, out):
     """A few lines for the eye; the rest is in report.json."""
     fit = report["registration"]["scan_to_face_mm"]
-    total = sum(report["timings_s"].values())
-    print(f"scan to face: mean {fit['mean']:.2f} mm, p95 {fit['p95']:.2f} mm; {total:.0f} s")
+    seconds = sum(time for stage, time in report["timings_s"].items() if not report["reused"][stage])
+    if fit["mean"] is not None:
+        print(f"scan to face: mean {fit['mean']:.2f} mm, p95 {fit['p95']:.2f} mm; {seconds:.0f} s")
     for warning in report["warnings"]:
         print(f"note: {warning}")
-    print(f"look at {out}/preview.png; the rig is {out}/rig.glb")
+    made = {"glb": "rig.glb", "obj": "obj/"}
+    files = " and ".join(str(Path(out, made[name])) for name in report["options"]["formats"])
+    print(f"look at {Path(out, 'preview.png')}; the rig is {files}")
 
 
 def _texture_size(text):
-    import argparse
-
     try:
         value = int(text)
     except ValueError:
@@ -87,9 +99,13 @@ def _texture_size(text):
     return value
 
 
-def _formats(text):
-    import argparse
+def _jobs(text):
+    if not text.isdigit() or not 1 <= int(text) <= 256:
+        raise argparse.ArgumentTypeError(f"{text}: give a number of threads from 1 to 256")
+    return int(text)
 
+
+def _formats(text):
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     unknown = [name for name in names if name not in ("glb", "obj")]
     if unknown or not names:

@@ -207,7 +207,7 @@ def _read_library(path, name):
 
 
 def _sources(path, maps):
-    return {role: ImageSource(_file_name(argument), beside=path) for role, argument in maps.items()}
+    return {role: ImageSource(texture_file(argument), beside=path) for role, argument in maps.items()}
 
 
 # Options of a texture line and how many words follow each (at most).
@@ -216,7 +216,7 @@ _TEXTURE_OPTIONS |= {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1}
 _OPTION_WORD = re.compile(r"on|off|[rgbmlz]|[-+]?[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
 
 
-def _file_name(argument):
+def texture_file(argument):
     """The file name of a texture line, behind its options; the name may hold blanks."""
     words = argument.split(" ")
     while len(words) > 1 and words[0].lower() in _TEXTURE_OPTIONS:

@@ -24,7 +24,12 @@ def build_report(scan, face, rig, clean_stats, pose_info):
 
     scan in our frame, face data.Face, rig data.Rig, clean_stats of clean_scan, pose_info of find_landmarks
     """
-    registration = measure_distances(scan, face.fit, face.template, face.regions)
+    shown = face.regions["face"] & ~face.regions["hidden"]
+    hidden_share = 1.0 - shown.sum() / max(face.regions["face"].sum(), 1)
+    registration = measure_distances(scan, face.fit, face.template, face.regions | {"face": shown})
+    registration["hidden_share"] = hidden_share
+    for figures in (registration["scan_to_face_mm"], registration["face_to_scan_mm"]):
+        figures["left_out"] = 1.0 - (1.0 - figures["left_out"]) * (1.0 - hidden_share)
     registration |= measure_quality(scan, face.fit, face.template, face.regions, face.lines)
     registration |= measure_seam(scan, face.fit, face.lines)
     registration["landmark_mm"] = face.stats["landmark_mm"]
@@ -85,6 +90,11 @@ def warnings(scan, face, registration, clean_stats, pose_info):
             f"the fit is poor: 5 % of the face are over {registration['scan_to_face_mm']['p95']:.1f} mm from the scan; "
             "move landmarks with --landmarks"
         )
+    if registration["hidden_share"] > 0.01:
+        notes.append(
+            f"{registration['hidden_share']:.0%} of the face lie under hair or cloth: there it follows "
+            "the model and is left out of the figures"
+        )
     if registration["folded"]:
         notes.append(f"{registration['folded']} faces of the fit are folded")
     return notes
@@ -92,22 +102,23 @@ def warnings(scan, face, registration, clean_stats, pose_info):
 
 def write_json(document, path):
     """Write JSON with sorted keys and finite numbers only."""
-    replace_file(path, (json.dumps(_plain(document), indent=1, sort_keys=True) + "\n").encode())
+    replace_file(path, (json.dumps(plain(document), indent=1, sort_keys=True) + "\n").encode())
 
 
-def _plain(value):
+def plain(value):
+    """A value as JSON knows it: numpy as numbers and lists, figures with 9 digits, infinite ones None."""
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, (int, np.integer)):
         return int(value)
     if isinstance(value, (float, np.floating)):
-        return round(float(value), 6) if math.isfinite(value) else None
+        return float(f"{value:.9g}") if math.isfinite(value) else None
     return value
 
 

@@ -6,7 +6,7 @@ from PIL import Image
 
 from facewright.errors import InputError
 from facewright.read import read_scan
-from facewright.read.obj import _file_name, _parse_corners
+from facewright.read.obj import texture_file, _parse_corners
 
 SQUARE = """v 0 0 0
 v 1 0 0.333333333333
@@ -146,6 +146,6 @@ def test_words_of_corners():
 
 
 def test_file_name_behind_options():
-    assert _file_name("-bm 0.3 -clamp on my skin.png") == "my skin.png"
-    assert _file_name("-o 1 2 3 -s 1 skin.png") == "skin.png"
-    assert _file_name("1.png") == "1.png"
+    assert texture_file("-bm 0.3 -clamp on my skin.png") == "my skin.png"
+    assert texture_file("-o 1 2 3 -s 1 skin.png") == "skin.png"
+    assert texture_file("1.png") == "1.png"
