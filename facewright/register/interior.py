@@ -14,19 +14,21 @@ CLEARANCE_MM = 0.4
 REACH_MM = 5.0
 
 
-def tuck_interior(vertices, faces, interior, outer, rounds=4):
+def tuck_interior(vertices, faces, interior, outer, lines, rounds=4):
     """Vertices (n, 3) with those of the interior that came through the skin moved back behind it.
 
-    interior, outer (n,) bool. An interior vertex in front of the nearest outer face, or nearer than CLEARANCE_MM
-    behind it, is pushed back; its neighbours follow smoothly; outer vertices do not move. The ring behind a rim is left
-    alone: there inside and outside meet.
+    interior, outer (n,) bool; lines (k,) feature-line vertices, which stay. An interior vertex in front of the nearest
+    outer face, or nearer than CLEARANCE_MM behind it, is pushed back; its neighbours follow smoothly; outer vertices do
+    not move. The ring behind a rim is left alone: there inside and outside meet.
     """
     seam = dilate(outer, faces, 1)
     loose = np.flatnonzero(interior & ~seam)
     if not len(loose):
         return vertices
     skin_faces = faces[outer[faces].all(axis=1)]
-    smoother = _spread(faces, interior & ~outer, len(vertices))
+    movable = interior & ~outer
+    movable[lines] = False
+    smoother = _spread(faces, movable, len(vertices))
     vertices = vertices.copy()
     for _ in range(rounds):
         normals = vertex_normals(vertices, skin_faces)

@@ -11,6 +11,7 @@ from facewright.data import Face
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.openness import vertex_openness
 from facewright.mesh.render import sample_texture
+from facewright.mesh.untangle import untangled
 from facewright.register.correspond import Target
 from facewright.register.interior import tuck_interior
 from facewright.register.lines import DEEP_MM, CreaseOptions, arc_fractions, trace_crease
@@ -27,11 +28,12 @@ SIDES = {"left": "Left", "right": "Right"}
 # How far a smile strays from rest, and shut lids from the template's blink.
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
+KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 LID_LANDMARKS = {
     "left": (362, 382, 381, 380, 374, 373, 390, 249, 263),
     "right": (133, 155, 154, 153, 145, 144, 163, 7, 33),
 }
-LINE_WEIGHT = 4.0
+LINE_WEIGHT, CONTACT_WEIGHT, LID_CONTACT_WEIGHT = 6.0, 200.0, 10.0
 PLACED_WEIGHT = 25.0
 """How much more than a found landmark one counts that a person placed."""
 
@@ -71,16 +73,18 @@ def register(scan, landmarks, template, options=None, placed=()):
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
-    interior, outer = _interior(template)
+    interior, outer, led = _interior(template)
     fit = model.vertices.copy()
-    fit[:stop] = tuck_interior(skin, faces, interior, outer)
+    steady = ~np.any([template.regions[name][:stop] for name in KNOTTY], axis=0)
+    steady[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
+    fit[:stop] = untangled(tuck_interior(skin, faces, interior, outer, led), faces, steady)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
         rest, removed = take_out_expression(template, model, fit[:stop], expression)
         if removed:
             neutral = model.rest.copy()
-            neutral[:stop] = tuck_interior(rest, faces, interior, outer)
+            neutral[:stop] = tuck_interior(rest, faces, interior, outer, led)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
@@ -97,7 +101,7 @@ def register(scan, landmarks, template, options=None, placed=()):
         template=template,
         vertices=neutral,
         fit=fit,
-        regions=template.regions,
+        regions=dict(template.regions) | {"hidden": _hidden(rules, observed)},
         lines=template.lines,
         observed=observed,
         expression=removed,
@@ -200,12 +204,20 @@ def _fit_model(template, target, pairs, closed, options):
     return model, names
 
 
+def _hidden(rules, observed):
+    """(n,) bool: where hair or cloth may lie and the scan was not believed; there the face follows the model."""
+    hidden = np.zeros(len(observed), bool)
+    hidden[: len(rules.hairy)] = rules.hairy & ~observed[: len(rules.hairy)]
+    return hidden
+
+
 def _interior(template):
-    """(n_skin,) bool masks: insides of mouth, sockets and nostrils, and the outer skin."""
+    """(n_skin,) bool insides of mouth, sockets and nostrils and outer skin, indices of lip and lid lines."""
     stop = template.skin.vertices[1]
     names = ("mouth_interior", "socket_left", "socket_right", "nostrils")
     outer = template.regions["outer"][:stop]
-    return np.any([template.regions[name][:stop] for name in names], axis=0) & ~outer, outer
+    led = np.concatenate([line for name, line in template.lines.items() if name.startswith(("lip_seam", "lid_"))])
+    return np.any([template.regions[name][:stop] for name in names], axis=0) & ~outer, outer, led
 
 
 def _leading_lines(scan, template, model, pairs, closed):
@@ -219,7 +231,7 @@ def _leading_lines(scan, template, model, pairs, closed):
         rows = Rows(
             pairs.rows[pairs.by_hand][:, :stop], pairs.points[pairs.by_hand], np.full(pairs.by_hand.sum(), 40.0)
         )
-        leading.append(lambda _vertices: [rows])
+        leading.append(_always(rows))
     upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
     middle = 0.5 * (model.vertices[upper] + model.vertices[lower])
     forward = normals[template.regions["lips"][:stop]].mean(axis=0)
@@ -229,8 +241,9 @@ def _leading_lines(scan, template, model, pairs, closed):
     if crease.found:
         for line in (upper, lower):
             leading.append(line_rows(line, crease, LINE_WEIGHT * crease_trust(crease), stop))
-        contact = contact_rows(upper[1:-1], lower[1:-1], 30.0, stop)
-        leading.append(lambda _vertices: [contact])
+        rest = template.vertices[upper] - template.vertices[lower]
+        contact = contact_rows(upper[1:-1], lower[1:-1], rest[1:-1], CONTACT_WEIGHT, stop)
+        leading.append(_always(contact))
     for side in SIDES:
         if not closed[side]:
             continue
@@ -249,9 +262,15 @@ def _leading_lines(scan, template, model, pairs, closed):
         if crease.found:
             for margin in (lid_upper, lid_lower):
                 leading.append(line_rows(margin, crease, LINE_WEIGHT * crease_trust(crease), stop))
-            contact = contact_rows(*_paired(lid_upper, lid_lower, model.vertices), 10.0, stop)
-            leading.append(lambda _vertices, contact=contact: [contact])
+            pairs_of_lids = _paired(lid_upper, lid_lower, model.vertices)
+            rest = np.zeros((len(pairs_of_lids[0]), 3))
+            contact = contact_rows(*pairs_of_lids, rest, LID_CONTACT_WEIGHT, stop)
+            leading.append(_always(contact))
     return tuple(leading), stats
+
+
+def _always(rows):
+    return lambda _vertices: [rows]
 
 
 def crease_trust(crease):

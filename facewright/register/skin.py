@@ -115,12 +115,12 @@ def line_rows(line, crease, weights, n):
     return rows
 
 
-def contact_rows(upper, lower, weight, n):
-    """Rows that draw paired vertices (k,), (k,) together, as closed lips are."""
+def contact_rows(upper, lower, offsets, weight, n):
+    """Rows that keep paired vertices (k,), (k,) at offsets (k, 3) mm, upper minus lower: closed lips, shut lids."""
     k = len(upper)
     rows = np.concatenate([np.arange(k), np.arange(k)])
     matrix = sp.csr_matrix((np.repeat([1.0, -1.0], k), (rows, np.concatenate([upper, lower]))), shape=(k, n))
-    return Rows(matrix, np.zeros((k, 3)), np.full(k, weight))
+    return Rows(matrix, offsets, np.full(k, weight))
 
 
 def fit_skin(start, faces, target, rules, leading, levels, samples=20000):

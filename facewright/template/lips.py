@@ -7,11 +7,11 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from facewright.mesh.adjacency import dilate, unique_edges, vertex_adjacency
+from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.closest import Surface
-from facewright.mesh.intersect import self_intersections
 from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass, uniform_laplacian
 from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.untangle import untangled
 from facewright.solve.quadratic import Factorization
 
 
@@ -160,25 +160,6 @@ def _apart(vertices, faces, sides, gap_mm):
             np.add.at(wishes, corners[hit, corner], -push * share[:, [corner]])
             np.add.at(weights, corners[hit, corner], share[:, corner])
     return wishes / np.maximum(weights, 1.0)[:, None], np.minimum(weights, 1.0) * PIN
-
-
-def untangled(vertices, faces, keep, *, rounds=60):
-    """Vertices (n, 3) in which the few faces that cross are smoothed with their neighbours until none does.
-
-    keep (n,) bool: vertices that stay; for the knots that are left where both lips run into the corner
-    """
-    moved = vertices.copy()
-    A = vertex_adjacency(faces, len(vertices))
-    degree = np.maximum(np.asarray(A.sum(axis=1)), 1)
-    for _ in range(rounds):
-        crossing = np.unique(self_intersections(moved, faces))
-        if not len(crossing):
-            break
-        knot = np.zeros(len(vertices), bool)
-        knot[faces[crossing].ravel()] = True
-        knot = dilate(knot, faces) & ~keep
-        moved[knot] = 0.5 * moved[knot] + 0.5 * ((A @ moved) / degree)[knot]
-    return moved
 
 
 def _rim(patch, n):

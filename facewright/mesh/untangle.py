@@ -1,0 +1,26 @@
+"""Small knots of crossing faces, smoothed away."""
+
+import numpy as np
+
+from facewright.mesh.adjacency import dilate, vertex_adjacency
+from facewright.mesh.intersect import self_intersections
+
+
+def untangled(vertices, faces, keep, *, rounds=60):
+    """Vertices (n, 3) in which the few faces that cross are smoothed with their neighbours until none does.
+
+    keep (n,) bool: vertices that stay; for the knots that are left where both lips run into the corner, and where
+    shut lids roll their rims into each other
+    """
+    moved = vertices.copy()
+    A = vertex_adjacency(faces, len(vertices))
+    degree = np.maximum(np.asarray(A.sum(axis=1)), 1)
+    for _ in range(rounds):
+        crossing = np.unique(self_intersections(moved, faces))
+        if not len(crossing):
+            break
+        knot = np.zeros(len(vertices), bool)
+        knot[faces[crossing].ravel()] = True
+        knot = dilate(knot, faces) & ~keep
+        moved[knot] = 0.5 * moved[knot] + 0.5 * ((A @ moved) / degree)[knot]
+    return moved
