@@ -14,6 +14,7 @@ from facewright.mesh.raster import Camera, RayScene
 
 SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
+RIM_MM = 2.0
 
 
 def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
@@ -128,12 +129,19 @@ def region_faces(mask, faces):
     return mask[faces].all(axis=1)
 
 
+def lid_rim_faces(vertices, faces, lines, rim_mm=RIM_MM):
+    """(m,) bool: faces within rim_mm of a lid margin: the thickness of the lids, which belongs to the eye opening."""
+    margins = np.concatenate([vertices[line] for name, line in lines.items() if name.startswith("lid_")])
+    return cKDTree(margins).query(vertices[faces].mean(axis=1))[0] < rim_mm
+
+
 def measure_quality(scan, fit, template, regions=None, lines=None):
     """Soundness of a fit, as report.json has it under `registration`.
 
     scan a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template
-    returns dict folded, self_intersections (pairs with a face in region `face` that the neutral has not), lip_gap_mm
-    (largest), visible_mouth_mm2
+    returns dict folded, folded_lid_rims (apart: a scan shows a bump or the other lid where the template has the lid's
+    thickness, so its normal there says nothing), self_intersections (pairs with a face in region `face` that the
+    neutral has not), lip_gap_mm (largest), visible_mouth_mm2
     """
     regions = template.regions if regions is None else regions
     lines = template.lines if lines is None else lines
@@ -141,6 +149,8 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     in_face = region_faces(regions["face"], faces)
     skin = np.zeros(len(faces), bool)
     skin[template.skin.face_slice] = True
+    folded = folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)
+    rim = lid_rim_faces(fit, faces, lines)
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)
     inside = region_faces(regions["mouth_interior"], faces)
@@ -148,7 +158,8 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
         if part.name in ("teeth_upper", "teeth_lower", "tongue"):
             inside[part.face_slice] = True
     return {
-        "folded": len(folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)),
+        "folded": int((~rim[folded]).sum()),
+        "folded_lid_rims": int(rim[folded].sum()),
         "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),
         "lip_gap_mm": float(gaps.max()),
         "visible_mouth_mm2": visible_interior_mm2(fit, faces, inside, middle),
