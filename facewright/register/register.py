@@ -33,7 +33,7 @@ LID_LANDMARKS = {
     "left": (362, 382, 381, 380, 374, 373, 390, 249, 263),
     "right": (133, 155, 154, 153, 145, 144, 163, 7, 33),
 }
-LINE_WEIGHT, CONTACT_WEIGHT, LID_CONTACT_WEIGHT = 6.0, 200.0, 10.0
+LINE_WEIGHT, CONTACT_WEIGHT, LID_CONTACT_WEIGHT = 2.0, 200.0, 10.0
 PLACED_WEIGHT = 25.0
 """How much more than a found landmark one counts that a person placed."""
 
