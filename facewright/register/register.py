@@ -84,7 +84,7 @@ def register(scan, landmarks, template, options=None, placed=()):
         rest, removed = take_out_expression(template, model, fit[:stop], expression)
         if removed:
             neutral = model.rest.copy()
-            neutral[:stop] = tuck_interior(rest, faces, interior, outer, led)
+            neutral[:stop] = untangled(tuck_interior(rest, faces, interior, outer, led), faces, steady)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
