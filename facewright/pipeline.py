@@ -147,22 +147,21 @@ def rig_job(path, out, options=None, progress=None):
     rerun_from = _stage_number(options.from_stage)
     inputs = _input_digests(path, options)
     folder = find_template(options.template)
+    template = read_template(folder)
     output = OutputFolder(out)
     store = StageStore(output.make())
     store.sweep()
     run = _Run(store, progress, rerun_from)
     try:
-        return _run_job(run, Path(path), output, options, inputs, folder)
+        return _run_job(run, Path(path), output, options, inputs, template, folder)
     except InputError:
         output.remove_what_is_new()
         raise
 
 
-def _run_job(run, path, output, options, inputs, folder):
+def _run_job(run, path, output, options, inputs, template, folder):
     scan, clean_stats = _read(run, path, options, inputs)
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
-    run.tell("03-register", "reading the template")
-    template = read_template(folder)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, face, template)
     deltas = _transfer(run, face, template)

@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,3 +175,18 @@ def hm08_person(hm08):
         )
 
     return person
+
+
+@pytest.fixture(scope="session")
+def sample_job(tmp_path_factory):
+    """The main job on the embedded sample, run once with one thread: its folder, options and report.
+
+    Whoever wants to change something in the folder makes a copy of it.
+    """
+    from facewright.pipeline import JobOptions, rig_job
+    from facewright.sample import sample_path
+
+    folder = tmp_path_factory.mktemp("sample") / "result"
+    options = JobOptions(texture_size=256, jobs=1)
+    report = rig_job(sample_path(), folder, options)
+    return SimpleNamespace(folder=folder, options=options, report=report)

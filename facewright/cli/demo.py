@@ -1,6 +1,9 @@
 """The main job on the embedded sample: a head that the project made itself, with the faults of a real scan.
 
-facewright demo            # writes into demo/
+  facewright demo
+  facewright demo --texture-size 512 --out small/
+
+Without --out the result goes to demo/; run it again and only what changed is worked out.
 """
 
 from facewright.cli.rig import add_job_arguments, run_job

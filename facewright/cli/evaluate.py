@@ -1,8 +1,10 @@
 """Print the figures of a finished job: how well the fit met the scan, and whether the shapes are sound.
 
-facewright evaluate result/
-facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
-facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+  facewright evaluate result/
+  facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
+  facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+
+Distances are in millimetres; docs/evaluate.md defines every figure.
 """
 
 from __future__ import annotations

@@ -1,10 +1,12 @@
 """Show the known head templates, or make one from an official folder.
 
-facewright template list
-facewright template info hm08
-facewright template fetch ict                      # downloads ICT-FaceKit Light from its makers (MIT licence)
-facewright template fetch ict --from ICT-FaceKit   # the same from a folder that is already here
-facewright template build --from FOLDER --description my_head.toml --out my_head/
+  facewright template list
+  facewright template info hm08
+  facewright template fetch ict                      # downloads ICT-FaceKit Light from its makers (MIT licence)
+  facewright template fetch ict --from ICT-FaceKit   # the same from a folder that is already here
+  facewright template build --from FOLDER --description my_head.toml --out my_head/
+
+Each of the four has a --help of its own.
 """
 
 from __future__ import annotations
@@ -17,16 +19,20 @@ HELP = "list, show, build and fetch head templates"
 def add_arguments(parser):
     """Arguments of `facewright template`."""
     actions = parser.add_subparsers(dest="action", metavar="list|info|build|fetch", required=True)
-    actions.add_parser("list", help="names and folders of the known templates")
-    info = actions.add_parser("info", help="what a template holds, and its licence")
-    info.add_argument("template", metavar="NAME|FOLDER")
-    build = actions.add_parser("build", help="make a template from a folder of OBJ files and a description")
+
+    def add(name, purpose):
+        return actions.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
+
+    add("list", "names and folders of the known templates")
+    info = add("info", "what a template holds, and its licence")
+    info.add_argument("template", metavar="NAME|FOLDER", help="a template's name, or a folder that holds one")
+    build = add("build", "make a template from a folder of OBJ files and a description")
     build.add_argument("--from", dest="source", required=True, metavar="FOLDER", help="the official folder")
     build.add_argument(
         "--description", default="ict", metavar="NAME|FILE", help="description (default: ict; docs/template.md)"
     )
     build.add_argument("--out", required=True, metavar="FOLDER", help="folder that receives the template")
-    fetch = actions.add_parser("fetch", help="get a template that is not shipped; then --template NAME finds it")
+    fetch = add("fetch", "get a template that is not shipped; then --template NAME finds it")
     fetch.add_argument("template", metavar="NAME", help="ict")
     fetch.add_argument("--from", dest="source", metavar="FOLDER", help="a local copy of the official folder")
     fetch.add_argument("--out", metavar="FOLDER", help="folder that receives it (default: ~/.facewright/templates)")
