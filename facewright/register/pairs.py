@@ -1,0 +1,82 @@
+"""Landmarks that scan and template share, and what they tell at once: whether the eyes are shut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, LIPS_INNER, LIPS_OUTER, NOSE
+
+PLACED_WEIGHT = 25.0
+"""How much more than a found landmark one counts that a person placed."""
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Landmarks that scan and template share: names (l,), points (l, 3) on the scan, rows (l, n), weights (l,).
+
+    rest (l, 3) the same points on the template's neutral; by_hand (l,) bool: placed by a person
+    """
+
+    names: tuple[str, ...]
+    points: np.ndarray
+    rows: sp.csr_matrix
+    weights: np.ndarray
+    rest: np.ndarray
+    by_hand: np.ndarray
+
+
+def landmark_pairs(scan, landmarks, template, placed):
+    """The Pairs of a scan's Landmarks and a Template's; placed: names of those that a person placed."""
+    on_template = {name: i for i, name in enumerate(template.landmarks.names)}
+    led = {f"mp{i}" for i in LIPS_OUTER + LIPS_INNER + EYE_LEFT + EYE_RIGHT + NOSE}
+    keep = [
+        (i, on_template[name])
+        for i, name in enumerate(landmarks.names)
+        if name in on_template
+        and landmarks.weights[i] > 0
+        and (name in led or name in placed)
+        and template.landmarks.weights[on_template[name]] > 0
+    ]
+    on_scan, rows_of = np.array(keep, np.int64).reshape(-1, 2).T
+    points = landmarks.positions(scan.vertices, scan.faces)[on_scan]
+    marks, faces = template.landmarks, template.faces
+    k = len(rows_of)
+    columns = faces[marks.faces[rows_of]]
+    rows = sp.csr_matrix(
+        (marks.barycentric[rows_of].ravel(), (np.repeat(np.arange(k), 3), columns.ravel())),
+        shape=(k, len(template.vertices)),
+    )
+    names = tuple(landmarks.names[i] for i in on_scan)
+    by_hand = np.array([name in placed for name in names], bool)
+    weights = np.where(by_hand, PLACED_WEIGHT, landmarks.weights[on_scan])
+    return Pairs(names, points, rows, weights, rows @ template.vertices, by_hand)
+
+
+def eyes_closed(pairs):
+    """{"left": bool, "right": bool}: the lids' landmarks are nearer to each other than a fifth of the rest face's."""
+    index = {name: i for i, name in enumerate(pairs.names)}
+    lids = {"left": ((386, 374), (385, 380), (387, 373)), "right": ((159, 145), (158, 153), (160, 144))}
+    widths = {"left": (362, 263), "right": (133, 33)}
+    result = {}
+    for side, columns in lids.items():
+        ratio = []
+        for points in (pairs.points, pairs.rest):
+            ends = [points[index[f"mp{i}"]] for i in widths[side] if f"mp{i}" in index]
+            gaps = [
+                np.linalg.norm(points[index[f"mp{a}"]] - points[index[f"mp{b}"]])
+                for a, b in columns
+                if f"mp{a}" in index and f"mp{b}" in index
+            ]
+            width = np.linalg.norm(ends[0] - ends[1]) if len(ends) == 2 else np.inf
+            ratio.append(float(np.mean(gaps)) / width if gaps else np.nan)
+        result[side] = bool(ratio[0] < 0.45 * ratio[1])
+    return result
+
+
+def landmark_errors(pairs, fit):
+    """dict mean, p95, max: distance of the fit's (n, 3) landmarks from the scan's, mm."""
+    error = np.linalg.norm(pairs.rows @ fit - pairs.points, axis=1)
+    return {"mean": float(error.mean()), "p95": float(np.quantile(error, 0.95)), "max": float(error.max())}
