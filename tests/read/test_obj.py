@@ -6,7 +6,7 @@ from PIL import Image
 
 from facewright.errors import InputError
 from facewright.read import read_scan
-from facewright.read.obj import texture_file, _parse_corners
+from facewright.read.obj import _parse_corners, texture_file
 
 SQUARE = """v 0 0 0
 v 1 0 0.333333333333

@@ -38,7 +38,7 @@ def open_eyed(hm08):
 
 
 def test_a_known_head_is_recovered(hm08, open_eyed):
-    truth, scan, face = open_eyed
+    truth, _, face = open_eyed
     error = np.linalg.norm(face.fit - truth, axis=1)
     assert error[hm08.regions["face"]].mean() < 0.5
     assert error[hm08.regions["lips"]].mean() < 0.5
