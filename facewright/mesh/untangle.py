@@ -15,12 +15,12 @@ def untangled(vertices, faces, keep, *, rounds=60):
     moved = vertices.copy()
     A = vertex_adjacency(faces, len(vertices))
     degree = np.maximum(np.asarray(A.sum(axis=1)), 1)
+    near = faces[dilate(~keep, faces, 3)[faces].all(axis=1)]
     for _ in range(rounds):
-        crossing = np.unique(self_intersections(moved, faces))
-        if not len(crossing):
-            break
         knot = np.zeros(len(vertices), bool)
-        knot[faces[crossing].ravel()] = True
+        knot[near[np.unique(self_intersections(moved, near))].ravel()] = True
         knot = dilate(knot, faces) & ~keep
+        if not knot.any():
+            break
         moved[knot] = 0.5 * moved[knot] + 0.5 * ((A @ moved) / degree)[knot]
     return moved

@@ -27,7 +27,7 @@ class ModelOptions:
 
     sigma_mm: float = 0.7
     n_effective: float = 100.0
-    iterations: int = 25
+    iterations: int = 20
     landmark_sigma_mm: float = 2.0
     landmark_floor: float = 0.2
 

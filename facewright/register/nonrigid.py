@@ -51,7 +51,7 @@ class ElasticSkin:
         self.stretching = self.stretching - sp.diags(row_sum)
         self.mass = mass
 
-    def solve(self, rows, w_bend, w_stretch, w_hold, start=None, tolerance=1e-4, max_iterations=60):
+    def solve(self, rows, w_bend, w_stretch, w_hold, start=None, tolerance=1e-3, max_iterations=40):
         """The displacement (n, 3) for a tuple of Rows."""
         n = len(self.vertices)
         shared = w_bend * self.bending + w_stretch * self.stretching + w_hold * sp.diags(self.mass)
