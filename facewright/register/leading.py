@@ -18,6 +18,7 @@ LID_CREASE = CreaseOptions(half_band_mm=3.0, overshoot_mm=2.0, prior_sigma_mm=1.
 # Against the surface's weight of one per mm2. More draws the skin off the surface where the crease is faint, less
 # leaves the seam beside it (0.5, 2, 6, 20, 60 tried on a real scan: p95 of the seam 0.41, 0.29, 0.30, 0.35, 0.36 mm).
 LINE_WEIGHT, CONTACT_WEIGHT, LID_CONTACT_WEIGHT, PLACED_ROW_WEIGHT = 2.0, 200.0, 10.0, 40.0
+LANDMARK_SLACK_MM, LANDMARK_WEIGHT = 1.5, 5.0
 
 
 def leading_lines(scan, template, model, pairs, closed):
@@ -33,6 +34,7 @@ def leading_lines(scan, template, model, pairs, closed):
             np.full(pairs.by_hand.sum(), PLACED_ROW_WEIGHT),
         )
         leading.append(_always(rows))
+    leading.append(_landmark_rows(pairs, stop))
     rows, found = _lip_rows(scan, template, model, normals, darkness)
     leading, stats = leading + rows, stats | found
     for side in closed:
@@ -40,6 +42,24 @@ def leading_lines(scan, template, model, pairs, closed):
             rows, found = _lid_rows(scan, template, model, pairs, normals, darkness, side)
             leading, stats = leading + rows, stats | found
     return tuple(leading), stats
+
+
+def _landmark_rows(pairs, stop):
+    """Function of the current vertices: Rows that pull in landmarks by what they are off beyond LANDMARK_SLACK_MM.
+
+    A landmark is right to a millimetre or two: held to the point it would bend a good fit (heads with known truth say
+    so), but a border of the lips or a wing of the nose that is 5 mm off leaves no trace in the surface's distance.
+    """
+    matrix = pairs.rows[:, :stop].tocsr()
+
+    def rows(vertices):
+        here = matrix @ vertices
+        gap = pairs.points - here
+        length = np.maximum(np.linalg.norm(gap, axis=1), 1e-9)
+        share = np.clip(1.0 - LANDMARK_SLACK_MM / length, 0.0, 1.0)
+        return [Rows(matrix, here + share[:, None] * gap, np.where(share > 0, LANDMARK_WEIGHT * pairs.weights, 0.0))]
+
+    return rows
 
 
 def _lip_rows(scan, template, model, normals, darkness):
