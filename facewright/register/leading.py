@@ -18,7 +18,7 @@ LID_CREASE = CreaseOptions(half_band_mm=3.0, overshoot_mm=2.0, prior_sigma_mm=1.
 # Against the surface's weight of one per mm2. More draws the skin off the surface where the crease is faint, less
 # leaves the seam beside it (0.5, 2, 6, 20, 60 tried on a real scan: p95 of the seam 0.41, 0.29, 0.30, 0.35, 0.36 mm).
 LINE_WEIGHT, CONTACT_WEIGHT, LID_CONTACT_WEIGHT, PLACED_ROW_WEIGHT = 2.0, 200.0, 10.0, 40.0
-LANDMARK_SLACK_MM, LANDMARK_WEIGHT = 1.5, 5.0
+LANDMARK_SLACK_MM, LANDMARK_WEIGHT, CONTACT_SHARE = 1.5, 5.0, 0.2
 
 
 def leading_lines(scan, template, model, pairs, closed):
@@ -73,7 +73,8 @@ def _lip_rows(scan, template, model, normals, darkness):
     if not crease.found:
         return [], stats
     trust = LINE_WEIGHT * crease_trust(crease)
-    rest = template.vertices[upper] - template.vertices[lower]
+    # Closer than the template's lips rest, or one sees between them; at 0 they cross.
+    rest = CONTACT_SHARE * (template.vertices[upper] - template.vertices[lower])
     contact = contact_rows(upper[1:-1], lower[1:-1], rest[1:-1], CONTACT_WEIGHT, stop)
     return [line_rows(upper, crease, trust, stop), line_rows(lower, crease, trust, stop), _always(contact)], stats
 
