@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
+
+import numpy as np
+from PIL import Image
 
 from facewright.errors import InputError
 
@@ -28,3 +32,12 @@ def file_name(name):
     """A name of the rig (a mesh, a map, a target) as a file name: whatever it holds, it cannot leave its folder."""
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in str(name)).lstrip(".")
     return safe or "unnamed"
+
+
+def png_bytes(pixels, level=3):
+    """A uint8 image (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) as PNG; a low level is quick rather than small."""
+    if pixels.dtype != np.uint8:
+        raise ValueError(f"maps are uint8, got {pixels.dtype}")
+    stream = io.BytesIO()
+    Image.fromarray(np.squeeze(pixels)).save(stream, "PNG", compress_level=level)
+    return stream.getvalue()

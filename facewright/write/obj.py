@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from facewright.mesh.render import linear_to_srgb
-from facewright.write.files import file_name, replace_file
-from facewright.write.rig import png_bytes
+from facewright.write.files import file_name, png_bytes, replace_file
 
 MATERIALS = "rig.mtl"
 

@@ -20,7 +20,7 @@ from PIL import Image
 from facewright.data import Material, Mesh, Rig, Skeleton
 from facewright.errors import InputError
 from facewright.template.store import npz_bytes
-from facewright.write.files import file_name, replace_file
+from facewright.write.files import file_name, png_bytes, replace_file
 
 FORMAT = 1
 DESCRIPTION = "rig.json"
@@ -60,15 +60,6 @@ def read_rig(folder):
         raise InputError(f"rig: {folder} is not a rig folder: {Path(error.filename).name} is missing") from error
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"rig: {folder} cannot be read: {error}") from error
-
-
-def png_bytes(pixels, level=3):
-    """A uint8 image (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) as PNG."""
-    if pixels.dtype != np.uint8:
-        raise ValueError(f"maps are uint8, got {pixels.dtype}")
-    stream = io.BytesIO()
-    Image.fromarray(np.squeeze(pixels)).save(stream, "PNG", compress_level=level)
-    return stream.getvalue()
 
 
 def _pack(rig):

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
-from PIL import Image
+from facewright.write.files import file_name, png_bytes, replace_file
 
-from facewright.write.files import file_name, replace_file
-
-PNG_LEVEL = 3
 LAYOUT = "the template's skin atlas: u to the right, v up, row 0 of an image is v = 1"
 CONVENTIONS = {
     "albedo": {
@@ -49,13 +44,6 @@ def write_textures(maps, folder, manifest=None):
     document = {"format": 1, "layout": LAYOUT, "maps": entries, **(manifest or {})}
     replace_file(folder / "manifest.json", (json.dumps(document, indent=2) + "\n").encode())
     return document
-
-
-def png_bytes(image):
-    """An image (h, w) or (h, w, c) uint8 as PNG; quick rather than small."""
-    buffer = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(image)).save(buffer, "png", compress_level=PNG_LEVEL)
-    return buffer.getvalue()
 
 
 def _entry(name, image):
