@@ -1,0 +1,134 @@
+"""Textures cut into tiles between weight texels, where the GPU's bilinear upsampling is one constant matrix.
+
+A weight map is stored eight times smaller. Every texel of the full map lies between the centres of four weight texels
+(cells); the 8 x 8 texels that share the same four are a tile. Upsampling is then, for every tile alike,
+w(p) = sum over c of B[c, p] w_c with a constant B (4, 64), and all sums over texels become small matrix products.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+STEP = 8
+TEXELS = STEP * STEP
+
+
+def bilinear_basis():
+    """B (4, 64) float32: share of the corner cells (top left, top right, bottom left, bottom right) in each texel."""
+    t = (np.arange(STEP) + 0.5) / STEP
+    line = np.stack([1 - t, t])
+    return np.einsum("ay,bx->abyx", line, line).reshape(4, TEXELS).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Sizes of a texture: height, width in texels; rows, columns of cells; tiles are one more each way."""
+
+    height: int
+    width: int
+
+    @property
+    def cells(self):
+        """(rows, columns) of the weight map."""
+        return -(-self.height // STEP), -(-self.width // STEP)
+
+    @property
+    def tiles(self):
+        """(rows, columns) of tiles."""
+        rows, columns = self.cells
+        return rows + 1, columns + 1
+
+    def cut(self, image, first=0, last=None):
+        """(tiles in rows first..last, C, 64) of an image (h, w, C); outside the image the tiles hold 0."""
+        rows, columns = self.tiles
+        last = rows if last is None else last
+        channels = image.shape[2]
+        padded = np.zeros(((last - first) * STEP, columns * STEP, channels), image.dtype)
+        top, bottom = max(first * STEP - STEP // 2, 0), min(last * STEP - STEP // 2, self.height)
+        start = top - (first * STEP - STEP // 2)
+        padded[start : start + bottom - top, STEP // 2 : STEP // 2 + self.width] = image[top:bottom]
+        tiles = padded.reshape(last - first, STEP, columns, STEP, channels).transpose(0, 2, 4, 1, 3)
+        return tiles.reshape((last - first) * columns, channels, TEXELS)
+
+    def join(self, tiles):
+        """(h, w, C) of all tiles (T, C, 64)."""
+        rows, columns = self.tiles
+        channels = tiles.shape[1]
+        image = tiles.reshape(rows, columns, channels, STEP, STEP).transpose(0, 3, 1, 4, 2)
+        image = image.reshape(rows * STEP, columns * STEP, channels)
+        return np.ascontiguousarray(
+            image[STEP // 2 : STEP // 2 + self.height, STEP // 2 : STEP // 2 + self.width]
+        )
+
+    def corner_cells(self):
+        """(T, 4) index of the four cells around each tile; cells beyond the border are the border's own (clamp)."""
+        rows, columns = self.cells
+        y = np.clip(np.arange(-1, rows + 1), 0, rows - 1)
+        x = np.clip(np.arange(-1, columns + 1), 0, columns - 1)
+        top, left = y[:-1], x[:-1]
+        bottom, right = y[1:], x[1:]
+        corners = [top[:, None] * columns + left, top[:, None] * columns + right]
+        corners += [bottom[:, None] * columns + left, bottom[:, None] * columns + right]
+        return np.stack([corner.ravel() for corner in corners], axis=1)
+
+    def upsample(self, weights):
+        """(h, w, k) float32 of a weight map (rows, columns, k), bilinear and clamped as a GPU reads it."""
+        # One axis after the other: the same numbers, a quarter of the work.
+        down = _upsample_axis(weights.astype(np.float32), self.height, 0)
+        return _upsample_axis(down, self.width, 1)
+
+
+def _upsample_axis(values, size, axis):
+    place = (np.arange(size) + 0.5) / STEP - 0.5
+    lower = np.floor(place).astype(np.int64)
+    share = (place - lower).astype(np.float32)
+    count = values.shape[axis]
+    low = np.take(values, np.clip(lower, 0, count - 1), axis=axis)
+    high = np.take(values, np.clip(lower + 1, 0, count - 1), axis=axis)
+    shape = [1, 1, 1]
+    shape[axis] = size
+    return low + (high - low) * share.reshape(shape)
+
+
+class TextureTiles:
+    """All textures of a set in tiles, 8 or 16 bits a channel as given; differences are made chunk by chunk.
+
+    neutral   (h, w, C) uint8 or uint16
+    textures  iterable of N images like it; each is cut as it comes and not kept
+    scale     (h, w) float32: 0 where no triangle covers the texel, else the square root of its priority
+    scratch   file to keep the tiles in instead of memory, so that memory does not grow with N
+    """
+
+    def __init__(self, neutral, textures, count, scale, scratch=None):
+        height, width, self.channels = neutral.shape
+        self.grid = Grid(height, width)
+        self.count = count
+        self.unit = 255.0 / np.iinfo(neutral.dtype).max
+        rows, columns = self.grid.tiles
+        shape = (rows * columns, count, self.channels, TEXELS)
+        if scratch is None:
+            self.data = np.empty(shape, neutral.dtype)
+        else:
+            self.data = np.memmap(scratch, neutral.dtype, "w+", shape=shape)
+        for n, texture in enumerate(textures):
+            for row in range(rows):
+                self.data[row * columns : (row + 1) * columns, n] = self.grid.cut(texture, row, row + 1)
+        self.neutral = self.grid.cut(neutral)
+        self.scale = self.grid.cut(scale.astype(np.float32)[:, :, None])
+
+    def __len__(self):
+        return len(self.data)
+
+    def chunks(self, size=96):
+        """Slices of tiles that fit the processor's cache."""
+        size = max(8, size * 20 // max(self.count, 20))
+        return [slice(start, min(start + size, len(self))) for start in range(0, len(self), size)]
+
+    def differences(self, part):
+        """(tiles, N, C * 64) float32 in 0-255, times scale."""
+        x = self.data[part].astype(np.float32)
+        x -= self.neutral[part, None].astype(np.float32)
+        x *= self.scale[part, None] * np.float32(self.unit)
+        return x.reshape(len(x), self.count, self.channels * TEXELS)
