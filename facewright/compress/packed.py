@@ -1,0 +1,140 @@
+"""Packed: what is stored (integers with a step and a zero each), and what decoding makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from facewright.compress.tiles import STEP, Grid
+from facewright.errors import InputError
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A compressed set. A stored code q means (q - zero) * step, in 0-255 units for textures whatever their depth.
+
+    neutral       (h, w, C) uint8 or uint16
+    textures      (K, h, w, C) codes like neutral; texture_step, texture_zero (K, C)
+    weights       (L, rows, columns, K) uint8 codes; weight_step, weight_zero (L, K)
+    names         of the N expressions; layers (N,) the weight map of each (equal textures share one)
+    report        numbers of the encoder
+    """
+
+    neutral: np.ndarray
+    textures: np.ndarray
+    texture_step: np.ndarray
+    texture_zero: np.ndarray
+    weights: np.ndarray
+    weight_step: np.ndarray
+    weight_zero: np.ndarray
+    names: tuple[str, ...]
+    layers: np.ndarray
+    report: dict = field(default_factory=dict)
+
+    @property
+    def grid(self):
+        """The lattice of texels and cells."""
+        return Grid(*self.neutral.shape[:2])
+
+    @property
+    def unit(self):
+        """0-255 units of one code of the neutral."""
+        return 255.0 / np.iinfo(self.neutral.dtype).max
+
+    def difference_textures(self):
+        """(K, h, w, C) float32, 0-255 units."""
+        zero = self.texture_zero[:, None, None].astype(np.float32)
+        return (self.textures.astype(np.float32) - zero) * self.texture_step[:, None, None].astype(np.float32)
+
+    def weight_maps(self):
+        """(L, rows, columns, K) float32."""
+        zero = self.weight_zero[:, None, None].astype(np.float32)
+        return (self.weights.astype(np.float32) - zero) * self.weight_step[:, None, None].astype(np.float32)
+
+    def memory_bytes(self):
+        """Bytes on a graphics card without block compression: RGB or what the maps have, weights four to an RGBA."""
+        layers = len(self.weights) * -(-self.textures.shape[0] // 4) * 4
+        weights = layers * self.weights.shape[1] * self.weights.shape[2]
+        return int(self.neutral.nbytes + self.textures.nbytes + weights)
+
+
+def facezip_decode(packed, weights):
+    """The texture of a blend (Eq. 8): neutral + sum_i D_i U(sum_n b_n W_in), clipped and rounded to the stored depth.
+
+    weights  dict name -> weight, or (N,) array in the order of packed.names
+    returns  (h, w, C) like packed.neutral
+    raises   InputError for a name that is not in the set
+    """
+    image = decode_float(packed, weights)
+    return np.rint(np.clip(image, 0, 255) / packed.unit).astype(packed.neutral.dtype)
+
+
+def decode_float(packed, weights, textures=None):
+    """As facezip_decode, in 0-255 units, neither clipped nor rounded; textures (K, h, w, C) if already at hand."""
+    beta = blend_vector(packed, weights)
+    per_layer = np.bincount(packed.layers, weights=beta, minlength=len(packed.weights))
+    used = np.flatnonzero(per_layer)
+    image = packed.neutral.astype(np.float32) * np.float32(packed.unit)
+    if not len(used):
+        return image
+    maps = (packed.weights[used].astype(np.float32) - packed.weight_zero[used, None, None]) * (
+        packed.weight_step * per_layer[:, None]
+    )[used, None, None]
+    full = packed.grid.upsample(maps.sum(axis=0).astype(np.float32))
+    textures = packed.difference_textures() if textures is None else textures
+    for i in range(len(textures)):
+        image += textures[i] * full[:, :, i, None]
+    return image
+
+
+def blend_vector(packed, weights):
+    """(N,) weights from a dict of names or an array."""
+    if not isinstance(weights, dict):
+        beta = np.asarray(weights, dtype=np.float64)
+        if beta.shape != (len(packed.names),):
+            raise ValueError(f"weights have shape {beta.shape}, expected ({len(packed.names)},)")
+        return beta
+    beta = np.zeros(len(packed.names))
+    for name, value in weights.items():
+        if name not in packed.names:
+            known = ", ".join(packed.names[:12]) + (", ..." if len(packed.names) > 12 else "")
+            raise InputError(f"decompress: the set has no expression {name!r}; it has {known}")
+        beta[packed.names.index(name)] = value
+    return beta
+
+
+def quantise(values, low, high, levels):
+    """Integer codes of values between low and high (broadcast), with 0 itself a code: codes, step, zero."""
+    low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+    step = (high - low) / levels
+    step = np.where(step > 0, step, 1.0)
+    zero = np.rint(-low / step)
+    kind = np.uint8 if levels == 255 else np.uint16
+    codes = np.clip(np.rint(values / step.astype(np.float32) + zero.astype(np.float32)), 0, levels).astype(kind)
+    return codes, step, zero
+
+
+def example_weights(packed, B):
+    """Weight maps (M, rows, columns, K) of M example-based shapes: W* = B+ W (Eq. 11).
+
+    B  (N, M), row n: what blend of the shapes makes expression n (Eq. 9); the pseudo-inverse is the one of least
+       norm, so Eq. 10 holds wherever B has full row rank
+    """
+    B = np.asarray(B, dtype=np.float64)
+    if B.ndim != 2 or B.shape[0] != len(packed.names):
+        raise ValueError(f"B has shape {B.shape}, expected ({len(packed.names)}, M)")
+    maps = packed.weight_maps()[packed.layers].astype(np.float64)
+    return np.tensordot(np.linalg.pinv(B), maps, 1)
+
+
+def naive_example(neutral, textures, B, m):
+    """Shape m by blending whole textures, the baseline of Fig. 8: I_0 + sum_n B+_mn (I_n - I_0); (h, w, C) float."""
+    share = np.linalg.pinv(np.asarray(B, dtype=np.float64))[m]
+    image = neutral.astype(np.float64)
+    for weight, texture in zip(share, textures):
+        image = image + weight * (texture.astype(np.float64) - neutral)
+    return image
+
+
+__all__ = ["STEP", "Packed", "blend_vector", "decode_float", "example_weights", "facezip_decode", "naive_example"]

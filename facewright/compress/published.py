@@ -1,0 +1,176 @@
+"""The published method: fragments under smooth masks, four clusters in each, and the permutation that joins them.
+
+Neither clustering nor permutation looks at a pixel: k-means needs the N x N inner products of a mask's fragments, the
+permutation cost (Eq. 3-4) those of the centroids under two masks, and both are sums of the Gram matrices of blocks.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+
+MOST_BLOCKS = 64
+
+
+def coarse_grams(tiles, grams, masks):
+    """Grams and mask values on at most 64 x 64 blocks: (b, N, N) float32 and (b, k)."""
+    rows, columns = tiles.grid.tiles
+    corner = masks.reshape(-1, masks.shape[2])[tiles.grid.corner_cells()].mean(axis=1)
+    step = max(1, -(-max(rows, columns) // MOST_BLOCKS))
+    by, bx = np.arange(rows) // step, np.arange(columns) // step
+    block = (by[:, None] * (bx[-1] + 1) + bx[None]).ravel()
+    order = np.argsort(block, kind="stable")
+    starts = np.flatnonzero(np.diff(block[order], prepend=-1))
+    sums = np.add.reduceat(grams[order], starts, axis=0)
+    counts = np.diff(np.append(starts, len(block)))
+    means = np.add.reduceat(corner[order], starts, axis=0) / counts[:, None]
+    return sums, means.astype(np.float32)
+
+
+def cluster_fragments(grams, k, *, restarts=20, iterations=30, seed=0):
+    """(masks, N) cluster of every fragment: k-means (best of some restarts) on the masks' Gram matrices (m, N, N)."""
+    m, n, _ = grams.shape
+    rng = np.random.default_rng(seed)
+    best, best_cost = np.zeros((m, n), int), np.full(m, np.inf)
+    diagonal = np.einsum("mnn->mn", grams)
+    for _ in range(restarts):
+        # k-means++: each next centre with a probability like its squared distance to the nearest one.
+        centres = rng.integers(n, size=(m, 1))
+        near = _from_points(grams, diagonal, centres[:, 0])
+        for _ in range(k - 1):
+            share = np.cumsum(near + 1e-12, axis=1)
+            pick = (share < rng.random((m, 1)) * share[:, -1:]).sum(axis=1).clip(max=n - 1)
+            centres = np.concatenate([centres, pick[:, None]], axis=1)
+            near = np.minimum(near, _from_points(grams, diagonal, pick))
+        distance = np.stack([_from_points(grams, diagonal, centres[:, i]) for i in range(k)], axis=2)
+        labels = distance.argmin(axis=2)
+        for _ in range(iterations):
+            one_hot = (labels[:, :, None] == np.arange(k)).astype(grams.dtype)
+            size = one_hot.sum(axis=1)
+            mean = one_hot / np.maximum(size, 1)[:, None]
+            cross = grams @ mean
+            own = np.einsum("mnk,mnk->mk", mean, cross)
+            distance = np.where(size[:, None] > 0, diagonal[:, :, None] - 2 * cross + own[:, None], np.inf)
+            following = distance.argmin(axis=2)
+            if (following == labels).all():
+                break
+            labels = following
+        cost = np.take_along_axis(distance, labels[:, :, None], axis=2)[:, :, 0].sum(axis=1)
+        better = cost < best_cost * (1 - 1e-9)
+        best[better], best_cost[better] = labels[better], cost[better]
+    return best
+
+
+def _from_points(grams, diagonal, index):
+    m = np.arange(len(grams))
+    return np.maximum(diagonal + diagonal[m, index][:, None] - 2 * grams[m, index], 0)
+
+
+def centroid_matrix(labels, k):
+    """(m, k, N): row i of mask m averages the fragments of cluster i; an empty cluster is zero."""
+    one_hot = (labels[:, None, :] == np.arange(k)[None, :, None]).astype(np.float32)
+    return one_hot / np.maximum(one_hot.sum(axis=2, keepdims=True), 1)
+
+
+def pair_costs(block_grams, block_masks, centroids):
+    """(m, m, k, k) squared difference of centroid a of mask 1 and b of mask 2 under both masks (Eq. 3-4)."""
+    m, k, n = centroids.shape
+    flat = block_grams.reshape(len(block_grams), -1)
+    squares = block_masks**2
+    costs = np.zeros((m, m, k, k))
+    for one in range(m):
+        others = np.arange(one + 1, m)
+        if not len(others):
+            continue
+        weight = squares[:, one]
+        near = weight > 1e-8
+        gram = ((squares[near][:, others] * weight[near, None]).T @ flat[near]).reshape(-1, n, n)
+        u = np.broadcast_to(centroids[one], (len(others), k, n))
+        v = centroids[others]
+        uu = np.einsum("pkn,pkn->pk", u @ gram, u)
+        vv = np.einsum("pkn,pkn->pk", v @ gram, v)
+        uv = u @ gram @ v.transpose(0, 2, 1)
+        cost = np.maximum(uu[:, :, None] + vv[:, None] - 2 * uv, 0)
+        costs[one, others] = cost
+        costs[others, one] = cost.transpose(0, 2, 1)
+    return costs
+
+
+class PermutationSearch:
+    """Cost of every pair of permutations of every pair of masks in one table: a sweep only looks numbers up.
+
+    costs (m, m, k, k) from pair_costs; a state is (chains, m), the number of a permutation for each mask
+    """
+
+    def __init__(self, costs):
+        self.m, k = len(costs), costs.shape[2]
+        self.permutations = np.array(list(permutations(range(k))))
+        p = self.permutations
+        table = sum(costs[:, :, p[:, None, i], p[None, :, i]] for i in range(k))
+        self.table = np.ascontiguousarray(table.transpose(0, 1, 3, 2)).astype(np.float32)  # [mask, other, its p, p]
+        number = {tuple(row): i for i, row in enumerate(p)}
+        self.compose = np.array([[number[tuple(a[b])] for b in p] for a in p])
+        self.coupled = np.argsort(-costs.sum(axis=(2, 3)), axis=1)
+
+    def cost(self, states):
+        """(chains,) cost of Eq. 3 over unordered pairs."""
+        m = np.arange(self.m)
+        pairs = self.table[m[:, None], m[None], states[:, None, :], states[:, :, None]]
+        return pairs.sum(axis=(1, 2), dtype=np.float64) / 2
+
+    def sweep(self, states):
+        """One sweep: each mask in turn takes its best permutation, the others held; in place, True where it moved."""
+        moved, m = False, np.arange(self.m)
+        for k in range(self.m):
+            best = self.table[k][m, states].sum(axis=1).argmin(axis=1)
+            moved |= bool((best != states[:, k]).any())
+            states[:, k] = best
+        return moved
+
+    def restarts(self, count, seed=0, sweeps=10):
+        """(count,) costs of the published search (random starts, 10 sweeps), the best state, and costs per sweep."""
+        rng = np.random.default_rng(seed)
+        states = rng.integers(len(self.permutations), size=(count, self.m))
+        history = [self.cost(states)]
+        for _ in range(sweeps):
+            self.sweep(states)
+            history.append(self.cost(states))
+        return history[-1], states[history[-1].argmin()], np.array(history)
+
+    def solve(self, seed=0, chains=16, rounds=80):
+        """The best state found: descent with kicks. A kick turns a mask and its most coupled ones by one permutation."""
+        rng = np.random.default_rng(seed)
+        states = rng.integers(len(self.permutations), size=(chains, self.m))
+        while self.sweep(states):
+            pass
+        cost = self.cost(states)
+        for round_number in range(rounds):
+            trial = states.copy()
+            for chain in range(chains):
+                group = self.coupled[rng.integers(self.m), : rng.integers(1, 13)]
+                turn = rng.integers(1, len(self.permutations)) if len(self.permutations) > 1 else 0
+                trial[chain, group] = self.compose[trial[chain, group], turn]
+            for _ in range(4):
+                if not self.sweep(trial):
+                    break
+            found = self.cost(trial)
+            better = found < cost
+            states[better], cost[better] = trial[better], found[better]
+            if round_number % 20 == 19:  # the worse half goes on from the better half
+                order = cost.argsort()
+                half = chains // 2
+                states[order[chains - half :]], cost[order[chains - half :]] = states[order[:half]], cost[order[:half]]
+        return states[cost.argmin()]
+
+
+def published_maps(masks, labels, centroids, chosen):
+    """Weight maps (rows, columns, N, K) of Eq. 6, and the shares (rows, columns, N, K) that make D of Eq. 5.
+
+    chosen  (m, K): cluster of each mask that goes into each difference texture
+    """
+    m = np.arange(len(labels))
+    slot = np.argsort(chosen, axis=1)  # cluster -> texture
+    alpha = (slot[m[:, None], labels][:, :, None] == np.arange(chosen.shape[1])).astype(np.float32)
+    picked = centroids[m[:, None], chosen].transpose(0, 2, 1)  # (m, N, K)
+    return np.tensordot(masks, alpha, 1), np.tensordot(masks, picked, 1)
