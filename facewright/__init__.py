@@ -41,6 +41,8 @@ _MODULES = {
     "facewright.write.rig": ("write_rig", "read_rig"),
     "facewright.write.textures": ("write_textures",),
     "facewright.write.preview": ("write_preview",),
+    # compress: expression textures small enough for a game
+    "facewright.compress": ("facezip", "facezip_decode", "FacezipOptions"),
     # what passes between the stages
     "facewright.data": ("Scan", "Landmarks", "Template", "Part", "Skeleton", "Face", "Material", "Mesh", "Rig"),
     "facewright.conventions": ("ARKIT_SHAPES",),

@@ -20,6 +20,7 @@ ALLOWED = {
     "parts": BASE | {"transfer"},
     "bake": BASE,
     "evaluate": BASE,
+    "compress": BASE | {"read", "write"},
     "write": BASE | {"evaluate", "bake", "parts", "template"},
 }
 

@@ -49,8 +49,19 @@ class FacezipOptions:
     permute: bool = True
 
 
-def facezip(neutral, textures, *, names=None, mesh=None, covered=None, region=None, priority=None, keep=(),
-            options=None, progress=None):
+def facezip(
+    neutral,
+    textures,
+    *,
+    names=None,
+    mesh=None,
+    covered=None,
+    region=None,
+    priority=None,
+    keep=(),
+    options=None,
+    progress=None,
+):
     """Compress aligned expression textures (FaceZip, Eq. 1-6, and beyond it a joint refinement).
 
     neutral   (h, w), (h, w, 1), (h, w, 3) or (h, w, 4), uint8 or uint16; sRGB or linear, blended as stored
@@ -75,8 +86,10 @@ def facezip(neutral, textures, *, names=None, mesh=None, covered=None, region=No
     _check(options, names, unique, keep)
     grid = Grid(*neutral.shape[:2])
     if covered is None:
-        covered = np.ones(neutral.shape[:2], bool) if mesh is None else covered_texels(
-            mesh.uv, mesh.uv_faces, grid.height, grid.width
+        covered = (
+            np.ones(neutral.shape[:2], bool)
+            if mesh is None
+            else covered_texels(mesh.uv, mesh.uv_faces, grid.height, grid.width)
         )
     if not covered.any():
         raise InputError("compress: no texel is covered by the mesh; check its UVs")
@@ -174,9 +187,7 @@ def _encode(tiles, k, options, mesh, region, held, progress):
         start[list(held)] = 0
         start[:, : len(held)] = 0
         start[list(held), range(len(held))] = 1
-    weights, values = refine(
-        tiles, start, iterations=options.iterations, keep=held, progress=progress
-    )
+    weights, values = refine(tiles, start, iterations=options.iterations, keep=held, progress=progress)
     result = _store(tiles, weights, k, held=held, report={"solution": "refined"})
     float_pca = gram.trace() - np.sort(np.linalg.eigvalsh(gram))[::-1][:k].sum()
     if not held and _squared(tiles, result) > float_pca:

@@ -58,9 +58,7 @@ class Grid:
         channels = tiles.shape[1]
         image = tiles.reshape(rows, columns, channels, STEP, STEP).transpose(0, 3, 1, 4, 2)
         image = image.reshape(rows * STEP, columns * STEP, channels)
-        return np.ascontiguousarray(
-            image[STEP // 2 : STEP // 2 + self.height, STEP // 2 : STEP // 2 + self.width]
-        )
+        return np.ascontiguousarray(image[STEP // 2 : STEP // 2 + self.height, STEP // 2 : STEP // 2 + self.width])
 
     def corner_cells(self):
         """(T, 4) index of the four cells around each tile; cells beyond the border are the border's own (clamp)."""

@@ -1,0 +1,45 @@
+"""Make the texture of a blend of expressions from a packed set.
+
+facewright decompress packed/ --weights smile=0.7,browDown=1 --out frame.png
+"""
+
+from __future__ import annotations
+
+import io
+
+from facewright.errors import InputError
+
+HELP = "the texture of a blend from a packed set"
+
+
+def add_arguments(parser):
+    """Arguments of `facewright decompress`."""
+    parser.add_argument("packed", metavar="FOLDER", help="a folder that `facewright compress` wrote")
+    parser.add_argument("--weights", required=True, metavar="NAME=W,...", help="for example smile=0.7,browDown=1")
+    parser.add_argument("--out", required=True, metavar="PNG", help="the image to write")
+
+
+def run(options):
+    """Decode and write."""
+    from PIL import Image
+
+    from facewright.compress import facezip_decode
+    from facewright.compress.files import read_packed
+    from facewright.write.files import replace_file
+
+    image = facezip_decode(read_packed(options.packed), parse_weights(options.weights))
+    stream = io.BytesIO()
+    Image.fromarray(image[:, :, 0] if image.shape[2] == 1 else image).save(stream, "PNG")
+    replace_file(options.out, stream.getvalue())
+
+
+def parse_weights(text):
+    """dict name -> weight of "a=1,b=0.5"."""
+    weights = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = item.rpartition("=")
+        try:
+            weights[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(f"decompress: {item!r} is no NAME=WEIGHT; write --weights smile=0.7,browDown=1") from None
+    return weights
