@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-from pathlib import Path
 
 from facewright.errors import InputError
 
@@ -64,10 +63,12 @@ def run(options):
         raise
     shutil.rmtree(output.stages, ignore_errors=True)
     worst = max(packed.report["rmse"], key=packed.report["rmse"].get)
+    rmse, size = packed.report["rmse"], packed.memory_bytes() / 1e6
+    worst = max(rmse, key=rmse.__getitem__)
     print(
-        f"{len(paths)} textures in {packed.memory_bytes() / 1e6:.1f} MB (raw {neutral.nbytes * len(paths) / 1e6:.1f}), "
-        f"RMSE {packed.report['mean_rmse']:.2f} of 255, worst {worst} {packed.report['rmse'][worst]:.2f}: {Path(options.out)}"
+        f"{len(paths)} textures in {size:.1f} MB instead of {neutral.nbytes * (len(paths) + 1) / 1e6:.1f}: {options.out}"
     )
+    print(f"RMSE {packed.report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
 
 
 class _Progress:

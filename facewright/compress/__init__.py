@@ -1,4 +1,4 @@
-"""FaceZip: many expression textures as a few difference textures and small weight maps. Needs no rig, no registration."""
+"""FaceZip: many expression textures as a few difference textures and small weight maps. Needs no rig."""
 
 from facewright.compress.encode import FacezipOptions, facezip
 from facewright.compress.packed import Packed, example_weights, facezip_decode, naive_example

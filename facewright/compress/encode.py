@@ -187,7 +187,7 @@ def _encode(tiles, k, options, mesh, region, held, progress):
         start[list(held)] = 0
         start[:, : len(held)] = 0
         start[list(held), range(len(held))] = 1
-    weights, values = refine(tiles, start, iterations=options.iterations, keep=held, progress=progress)
+    weights, _ = refine(tiles, start, iterations=options.iterations, keep=held, progress=progress)
     result = _store(tiles, weights, k, held=held, report={"solution": "refined"})
     float_pca = gram.trace() - np.sort(np.linalg.eigvalsh(gram))[::-1][:k].sum()
     if not held and _squared(tiles, result) > float_pca:

@@ -139,7 +139,7 @@ class PermutationSearch:
         return history[-1], states[history[-1].argmin()], np.array(history)
 
     def solve(self, seed=0, chains=16, rounds=80):
-        """The best state found: descent with kicks. A kick turns a mask and its most coupled ones by one permutation."""
+        """The best state found: descent with kicks. A kick permutes a mask and those coupled to it alike."""
         rng = np.random.default_rng(seed)
         states = rng.integers(len(self.permutations), size=(chains, self.m))
         while self.sweep(states):

@@ -1,7 +1,7 @@
 """The runtime as shader text: a low-resolution pass sums weight maps, the full-resolution pass reads six textures."""
 
-GLSL = """// FaceZip runtime (WebGL 2 / GLSL ES 3.00), up to four difference textures of 8 bits. Values are in facezip.json.
-// Pass 1, once for every expression with a weight, into an RGBA16F target of weight_size, additive blending (ONE, ONE):
+GLSL = """// FaceZip runtime (WebGL 2 / GLSL ES 3.00), up to four 8-bit difference textures. Values: facezip.json.
+// Pass 1, once for every expression with a weight, into an RGBA16F target of weight_size, additive (ONE, ONE):
 //   outColor = facezipWeight(uv)
 uniform sampler2D facezipWeightMap;
 uniform vec4 facezipWeightStep, facezipWeightZero;   // weights[layer]; zero in codes, 0-255
@@ -24,7 +24,7 @@ vec3 facezip(vec2 uv) {
 }
 """
 
-HLSL = """// FaceZip runtime (HLSL, Shader Model 5), up to four difference textures of 8 bits. Values are in facezip.json.
+HLSL = """// FaceZip runtime (HLSL, Shader Model 5), up to four 8-bit difference textures. Values: facezip.json.
 // uv has its origin at the top left of the image. Pass 1: additive into an RGBA16F target of weight_size.
 Texture2D facezipWeightMap, facezipNeutral, facezipD0, facezipD1, facezipD2, facezipD3, facezipSum;
 SamplerState facezipLinearClamp;
