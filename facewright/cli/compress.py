@@ -65,9 +65,7 @@ def run(options):
     worst = max(packed.report["rmse"], key=packed.report["rmse"].get)
     rmse, size = packed.report["rmse"], packed.memory_bytes() / 1e6
     worst = max(rmse, key=rmse.__getitem__)
-    print(
-        f"{len(paths)} textures in {size:.1f} MB instead of {neutral.nbytes * (len(paths) + 1) / 1e6:.1f}: {options.out}"
-    )
+    print(f"{len(paths)} textures in {size:.1f} MB, raw {neutral.nbytes * (len(paths) + 1) / 1e6:.1f}: {options.out}")
     print(f"RMSE {packed.report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
 
 
