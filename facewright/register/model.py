@@ -71,6 +71,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
     areas *= options.n_effective / areas.sum()
     landmark_model = _project(landmark_rows, mean, basis, deltas)
+    linear = np.concatenate([basis[:, sampled], deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
     for _ in range(8):
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
@@ -80,8 +81,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
         normals = vertex_normals(vertices, faces)
         reach = 25.0 * (1 - progress) + 6.0
         matches = target.match(vertices[sampled], normals[sampled], max_distance=reach, tau=max(2.0, reach / 3))
-        jacobian = state.jacobian(mean[sampled], basis[:, sampled], deltas[:, sampled])  # (k, 3, p)
-        rows = np.einsum("kc,kcp->kp", matches.normals, jacobian)
+        rows = state.normal_rows(vertices[sampled], matches.normals, linear)
         residuals = np.einsum("kc,kc->k", matches.normals, vertices[sampled] - matches.points)
         height = np.einsum("kc,kc->k", normals[sampled], matches.points - vertices[sampled])
         # Heights mean little while the model is still far off.
@@ -157,6 +157,17 @@ class _State:
         cross[:, 2, 0], cross[:, 2, 1] = arm[:, 1], -arm[:, 0]
         eye = np.broadcast_to(np.eye(3), (k, 3, 3))
         return np.concatenate([linear.transpose(1, 2, 0), cross, arm[:, :, None], eye], axis=2)
+
+    def normal_rows(self, positions, normals, linear):
+        """(k, p) the jacobian of positions (k, 3) along normals (k, 3); linear (3, k, i + e) basis and expressions.
+
+        The same as the jacobian's product with the normals, without its (k, 3, p) array.
+        """
+        turned = normals @ (self.s * self.R)
+        shape = sum(turned[:, axis, None] * linear[axis] for axis in range(3))
+        arm = positions - self.t
+        size = np.einsum("kc,kc->k", arm, normals)[:, None]
+        return np.concatenate([shape, np.cross(arm, normals), size, normals], axis=1)
 
     def step(self, terms):
         """One Gauss-Newton step on weighted rows, with the priors."""

@@ -12,6 +12,7 @@ from facewright.mesh.untangle import untangled
 from facewright.register.correspond import Target
 from facewright.register.interior import tuck_interior
 from facewright.register.leading import leading_lines
+from facewright.register.localize import localized_basis
 from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
 from facewright.register.pairs import eyes_closed, landmark_errors, landmark_pairs
@@ -117,9 +118,12 @@ def _fit_model(template, target, pairs, closed, options):
     ears = template.regions["ear_left"] | template.regions["ear_right"]
     trust[~template.regions["face"] & ~ears] *= 0.3
     trust[template.regions["scalp"]] = 0.0  # it may be hair
+    basis = localized_basis(
+        template.vertices, template.identity_basis, template.regions["face"], template.regions["outer"]
+    )
     model = fit_model(
         template.vertices,
-        template.identity_basis,
+        basis,
         expressions,
         template.faces[template.skin.face_slice],
         trust,
