@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.mesh.adjacency import vertex_adjacency
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
 
@@ -50,10 +51,20 @@ def _nose(template, lip_middle):
     near = face[(V[face, 1] < V[tip, 1] + 8.0) & (V[face, 1] > V[subnasale, 1] - 3.0)]
     near = near[(np.abs(V[near, 0]) < 26.0) & (V[near, 2] > V[subnasale, 2] - 14.0)]
     result = {"nose_tip": tip, "subnasale": subnasale}
+    # The wing is a bulge: behind its rim the groove to the cheek looks sideways too, out of the sight of who picks.
+    bulges = near[_height_over_neighbours(template, normals)[near] > 0]
     for side, sign in (("right", -1.0), ("left", 1.0)):
-        wing = near[sign * normals[near, 0] > 0.85]
+        wing = bulges[sign * normals[bulges, 0] > 0.85]
         result[f"alar_wing_{side}"] = wing[(sign * V[wing, 0]).argmax()]
     return result
+
+
+def _height_over_neighbours(template, normals):
+    """(n,) mm by which a vertex stands over the mean of its neighbours: positive where the skin bulges."""
+    V = template.vertices
+    A = vertex_adjacency(template.faces[template.skin.face_slice], len(V))
+    count = np.maximum(np.asarray(A.sum(axis=1)).ravel(), 1.0)
+    return np.einsum("nc,nc->n", V - (A @ V) / count[:, None], normals)
 
 
 def ibug_positions(template, vertices):
