@@ -1,0 +1,4 @@
+"""Contact between the moving pieces of a head, solved per head after transfer."""
+
+
+
