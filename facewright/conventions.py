@@ -30,6 +30,7 @@ def mirrored_name(shape):
         return shape[:-5] + "Left"
     return shape
 
+
 CORRECTIVE_JOIN = "+"
 
 

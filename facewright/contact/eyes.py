@@ -190,4 +190,4 @@ class _Eye:
 def _profile(chain):
     """(k,) 0 at the canthi, 1 over the middle of a margin."""
     steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
-    return np.sin(np.pi * steps / steps[-1]) ** 0.6
+    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** 0.6

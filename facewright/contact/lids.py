@@ -49,7 +49,9 @@ class Lids:
         self.margin = np.unique(np.concatenate([self.upper, self.lower]))
         self.canthi = np.intersect1d(self.upper, self.lower)
         self.skin = np.flatnonzero(outer & free)
-        clear = lid_clearance(vertices[self.skin], vertices[self.margin], self.options.gap_mm, self.options.skin_clear_mm)
+        clear = lid_clearance(
+            vertices[self.skin], vertices[self.margin], self.options.gap_mm, self.options.skin_clear_mm
+        )
         # Nothing is asked for that the neutral does not have: the corners lie deep and stay so.
         self.clear = np.minimum(clear, np.maximum(ball.gap(vertices[self.skin]), self.options.gap_mm))
         self._corner = np.isin(self.skin, self.canthi)
@@ -69,7 +71,7 @@ class Lids:
         return theta_u - below, above - theta_l
 
     def turned(self, pose, upper_turn, lower_turn, ball=None):
-        """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them, off the ball."""
+        """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them."""
         field = self.field(upper_turn, lower_turn)
         return self.lifted(self.rotated(pose, field), ball)
 
@@ -84,7 +86,7 @@ class Lids:
         return spread[:, 0]
 
     def rotated(self, pose, field):
-        """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is in front."""
+        """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
         offset = pose - self.ball.center
         c, s = np.cos(field)[:, None], np.sin(field)[:, None]
         axis = -self.axis
