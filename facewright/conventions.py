@@ -29,3 +29,16 @@ def mirrored_name(shape):
     if shape.endswith("Right"):
         return shape[:-5] + "Left"
     return shape
+
+
+CORRECTIVE_JOIN = "+"
+
+
+def in_between_name(name, weight):
+    """Name of the target that a shape passes at a weight between 0 and 1: "eyeBlinkLeft@0.5"."""
+    return f"{name}@{weight:g}"
+
+
+def corrective_name(drivers):
+    """Name of the target that is added where all drivers act: "eyeBlinkLeft+eyeSquintLeft"."""
+    return CORRECTIVE_JOIN.join(drivers)

@@ -306,8 +306,8 @@ class Rig:
 
     meshes       tuple of Mesh; meshes[0] is the skin
     target_names (t,) the one list of targets that every moving mesh carries, in this order
-    in_betweens  dict target -> {weight: target name of the in-between}; empty for the plain 52
-    correctives  dict target -> tuple of driver names; empty for the plain 52
+    in_betweens  dict target -> {weight: target name of the in-between}; expand.py has the rule
+    correctives  dict target -> tuple of driver names
     maps         name -> (h, w, c) uint8 image; info["maps"][name] says colour space and convention
     regions      name -> (n_skin,) bool on meshes[0]; lines name -> vertex indices on meshes[0]
     info         dict: template, topology_id, credits, copyright, units, T_rig_to_scan (4x4 nested list), ...
@@ -329,6 +329,14 @@ class Rig:
                 raise ValueError(
                     f"Rig: mesh {mesh.name!r} has {len(mesh.deltas)} targets, the rig {len(self.target_names)}"
                 )
+
+    def plain(self):
+        """The Rig without in-betweens and correctives: for players that know one weight per shape."""
+        extra = {target for steps in self.in_betweens.values() for target in steps.values()} | set(self.correctives)
+        keep = [i for i, name in enumerate(self.target_names) if name not in extra]
+        meshes = tuple(mesh if mesh.deltas is None else replace(mesh, deltas=mesh.deltas[keep]) for mesh in self.meshes)
+        names = tuple(self.target_names[i] for i in keep)
+        return replace(self, meshes=meshes, target_names=names, in_betweens={}, correctives={})
 
     def __repr__(self):
         return f"Rig({len(self.meshes)} meshes, {len(self.target_names)} targets, maps {sorted(self.maps)})"

@@ -12,6 +12,7 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
+from facewright.contact import EyeShapes, solve_eyes
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
 from facewright.output import OutputFolder
@@ -59,7 +60,8 @@ class JobOptions:
     eyes          "template": closed lids are opened to the template's aperture; "as-scanned": left as they are
     landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
     formats       what to write: glb, obj
-    shapes        "apple": exactly the 52 ARKit shapes
+    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": in-betweens ("name@0.5")
+                  and pair correctives ("a+b") too. rig/ always has all of them
     jobs          threads inside the job; the result does not depend on it
     from_stage    run this stage and all after it again, whatever is cached
     """
@@ -81,8 +83,8 @@ class JobOptions:
     def __post_init__(self):
         if self.eyes not in ("template", "as-scanned"):
             raise ValueError(f"eyes is 'template' or 'as-scanned', got {self.eyes!r}")
-        if self.shapes != "apple":
-            raise ValueError(f"shapes is 'apple', got {self.shapes!r}")
+        if self.shapes not in ("apple", "full"):
+            raise ValueError(f"shapes is 'apple' or 'full', got {self.shapes!r}")
         if not self.formats or not set(self.formats) <= {"glb", "obj"}:
             raise ValueError(f"formats are glb and obj, got {self.formats!r}")
         if self.texture_size < 1 or self.jobs < 1:
@@ -164,9 +166,9 @@ def _run_job(run, path, output, options, inputs, template, folder):
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, face, template)
-    deltas = _transfer(run, face, template)
+    shapes = _transfer(run, face, template)
     maps = _bake(run, scan, face, options)
-    report = _write(run, scan, face, deltas, maps, (clean_stats, pose_info), output, options)
+    report = _write(run, scan, face, shapes, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
     report["reused"] = run.reused
     report["peak_memory_mb"] = peak_memory_mb()
@@ -230,10 +232,19 @@ def _parts(run, face, template):
 
 def _transfer(run, face, template):
     def work():
-        return {"deltas": transfer_shapes(face)}, {"names": list(template.shape_names)}
+        eyes = solve_eyes(face, transfer_shapes(face))
+        info = {"names": list(template.shape_names), "extras": list(eyes.extras)}
+        info["in_betweens"] = {name: list(map(list, steps.items())) for name, steps in eyes.in_betweens.items()}
+        info["correctives"] = {name: list(drivers) for name, drivers in eyes.correctives.items()}
+        return {"deltas": eyes.deltas, "extras": np.array(list(eyes.extras.values()))}, info
 
-    arrays, _ = run.stage("05-transfer", work, list(ARKIT_SHAPES))
-    return arrays["deltas"]
+    arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
+    return EyeShapes(
+        arrays["deltas"],
+        dict(zip(info["extras"], arrays["extras"])),
+        {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"].items()},
+        {name: tuple(drivers) for name, drivers in info["correctives"].items()},
+    )
 
 
 def _bake(run, scan, face, options):
@@ -246,13 +257,14 @@ def _bake(run, scan, face, options):
     return arrays
 
 
-def _write(run, scan, face, deltas, maps, found, output, options):
+def _write(run, scan, face, shapes, maps, found, output, options):
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
-        rig = build_rig(face, deltas, maps)
+        rig = build_rig(face, shapes.deltas, maps, eyes=shapes)
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
-        report = plain(build_report(scan, face, rig, *found))
+        carried = rig if options.shapes == "full" else rig.plain()
+        report = plain(build_report(scan, face, carried, *found))
         earlier = run.store.last_info("07-write").get("files", {})
         with output.workshop() as folder:
             write_results(rig, maps, scan, face, folder, options)
@@ -261,19 +273,21 @@ def _write(run, scan, face, deltas, maps, found, output, options):
     def intact(info):
         return output.holds(info["files"])
 
-    return run.stage("07-write", work, sorted(options.formats), intact=intact)[1]["report"]
+    return run.stage("07-write", work, [*sorted(options.formats), options.shapes], intact=intact)[1]["report"]
 
 
 def write_results(rig, maps, scan, face, folder, options):
     """Every file of a result but report.json and stages/."""
+    plain_rig = rig.plain()
+    carried = rig if options.shapes == "full" else plain_rig
     if "glb" in options.formats:
-        write_gltf(rig, folder / "rig.glb")
+        write_gltf(carried, folder / "rig.glb")
     if "obj" in options.formats:
-        write_obj(rig, folder / "obj")
+        write_obj(carried, folder / "obj")
     write_credits(rig, folder / "CREDITS.txt")
     write_rig(rig, folder / "rig")
     write_textures(maps, folder / "textures", describe_maps(face, maps))
-    write_preview(rig, scan, face, folder / "preview.png", options.jobs)
+    write_preview(plain_rig, scan, face, folder / "preview.png", options.jobs)
 
 
 def _rig_to_scan(scan):

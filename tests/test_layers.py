@@ -17,9 +17,10 @@ ALLOWED = {
     "scan": BASE,
     "transfer": BASE,
     "register": BASE | {"scan", "transfer"},
+    "contact": BASE | {"transfer"},
     "parts": BASE | {"transfer"},
     "bake": BASE,
-    "evaluate": BASE,
+    "evaluate": BASE | {"expand"},
     "compress": BASE | {"read", "write"},
     "write": BASE | {"evaluate", "bake", "parts", "template"},
 }

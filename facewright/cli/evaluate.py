@@ -2,6 +2,7 @@
 
   facewright evaluate result/
   facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
+  facewright evaluate rig result/                 # bars of the finished rig: lids and eyeballs
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
 
 Distances are in millimetres; docs/evaluate.md defines every figure.
@@ -20,7 +21,7 @@ COLUMNS = ("mean", "rms", "p95", "max", "left_out")
 
 def add_arguments(parser):
     """Arguments of `facewright evaluate`."""
-    parser.add_argument("result", metavar="FOLDER", help="a folder that `facewright rig` wrote")
+    parser.add_argument("result", nargs="+", metavar="[rig] FOLDER", help="a folder that `facewright rig` wrote")
     parser.add_argument("--scan", metavar="FILE", help="the scan that the rig was made from")
     parser.add_argument("--shapes", action="store_true", help="measure every shape too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
@@ -28,7 +29,13 @@ def add_arguments(parser):
 
 def run(options):
     """Collect the figures and print them."""
-    figures = collect(Path(options.result), options.scan, options.shapes)
+    *what, folder = options.result
+    if what == ["rig"]:
+        print_eyes(Path(folder), options.json)
+        return
+    if what:
+        raise InputError(f"evaluate: one folder at a time, got {len(options.result)}; or: evaluate rig FOLDER")
+    figures = collect(Path(folder), options.scan, options.shapes)
     if options.json:
         print(json.dumps(figures, indent=1))
         return
@@ -43,6 +50,27 @@ def run(options):
         print_distances("the rig's neutral against the scan (mm)", rows)
     for name, values in figures.get("shapes", {}).items():
         print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
+
+
+def print_eyes(folder, as_json):
+    """The bars of lids and eyeballs: with in-betweens and correctives, and the plain 52 beside them."""
+    from facewright.evaluate.eyes import DEPTH_BAR_MM, GAP_BAR_MM, measure_eyes
+    from facewright.write.rig import read_rig
+
+    eyes = measure_eyes(read_rig(folder / "rig"))
+    if as_json:
+        print(json.dumps(eyes, indent=1))
+        return
+    print(
+        f"eyeball radius {eyes['radius_mm']:.2f} mm (11.5 to 12.5), lid gap at rest {eyes['lid_gap_mm']:.2f} mm (0.3)"
+    )
+    print("  ".join(["pose".ljust(28), "figure".ljust(10), "bar".rjust(5), "full".rjust(6), "plain".rjust(6)]))
+    for pose, figures in eyes["poses"].items():
+        for key, bar in (("depth_mm", DEPTH_BAR_MM), ("margins_mm", GAP_BAR_MM)):
+            if key in figures:
+                full, plain = figures[key]
+                verdict = "" if full <= bar else "  missed"
+                print(f"{pose.ljust(28)}  {key.ljust(10)}  {bar:5.2f}  {full:6.2f}  {plain:6.2f}{verdict}")
 
 
 def collect(folder, scan_file=None, shapes=False):

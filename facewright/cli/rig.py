@@ -18,6 +18,7 @@ from facewright.conventions import MM_PER_UNIT
 
 HELP = "make a rig from one head scan"
 UPS = ("x", "y", "z", "-x", "-y", "-z")
+SHAPES_HELP = "apple: exactly the 52 ARKit shapes; full: in-betweens (name@0.5) and pair correctives (a+b) too"
 
 
 def add_job_arguments(parser):
@@ -35,7 +36,7 @@ def add_job_arguments(parser):
     parser.add_argument(
         "--formats", type=_formats, default=("glb",), metavar="LIST", help="glb, obj, comma-separated (default: glb)"
     )
-    parser.add_argument("--shapes", choices=("apple",), default="apple", help="apple: exactly the 52 ARKit shapes")
+    parser.add_argument("--shapes", choices=("apple", "full"), default="apple", help=SHAPES_HELP)
     parser.add_argument(
         "--jobs", type=_jobs, default=2, metavar="N", help="threads (default: 2); the result does not depend on it"
     )

@@ -26,16 +26,21 @@ class AssemblyOptions:
     left_out: tuple[str, ...] = ("lashes", "occlusion", "blend", "lacrimal")
 
 
-def build_rig(face, deltas, maps=None, options=None):
+def build_rig(face, deltas, maps=None, options=None, eyes=None):
     """The Rig of a Face whose parts are in place (fit_parts) with its shapes (transfer_shapes).
 
     deltas  (s, n, 3) mm from face.vertices, in the order of face.template.shape_names
     maps    name -> (h, w, c) uint8 of the skin; "albedo" and "normal" go on its material, others are left to textures/
+    eyes    contact.EyeShapes whose in-betweens and correctives the rig shall have; deltas are then eyes.deltas
     returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
     """
     options = options or AssemblyOptions()
     maps = maps or {}
     template = face.template
+    names = template.shape_names
+    if eyes is not None and eyes.extras:
+        names = (*names, *eyes.extras)
+        deltas = np.concatenate([deltas, np.stack(list(eyes.extras.values()))])
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
     meshes = []
     for part in template.parts:
@@ -47,12 +52,14 @@ def build_rig(face, deltas, maps=None, options=None):
     n_skin = template.skin.vertices[1]
     return Rig(
         meshes=tuple(meshes),
-        target_names=template.shape_names,
+        target_names=names,
         skeleton=fit_skeleton(template, face.vertices),
         maps=used,
         regions={name: mask[:n_skin] for name, mask in face.regions.items()},
         lines={name: line for name, line in face.lines.items() if (np.asarray(line) < n_skin).all()},
         info=rig_info(template),
+        in_betweens=eyes.in_betweens if eyes is not None else {},
+        correctives=eyes.correctives if eyes is not None else {},
     )
 
 

@@ -1,0 +1,193 @@
+"""The shapes of the eyes, made by rule on each head: blink, squint, wide and gaze, with what their path and pairs need.
+
+A morph target moves vertices along chords, lids and eyeballs move along arcs: an in-between at half weight keeps lids
+out of the ball. Two shapes that both lower a lid add up to too much: a corrective per pair, weighted by the product of
+the two, brings the margins together again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from facewright.contact.gaze import gaze_rotation, look_shapes, turned_ball
+from facewright.contact.lids import LidMotionOptions, Lids
+from facewright.conventions import corrective_name, in_between_name
+from facewright.transfer.eyeball import carried_eyeball, eye_parts
+
+HALF = 0.5
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class EyeShapeOptions:
+    """lids            how lids move
+    look_turn_deg   direction -> degrees by which upper and lower margin follow the gaze (up is positive)
+    wide_turn_deg   the same for eyeWide
+    squint_share    of the opening by which eyeSquint lowers the upper and raises the lower lid
+    free_mm         skin this far from the margins may move with the lids
+    """
+
+    lids: LidMotionOptions = field(default_factory=LidMotionOptions)
+    look_turn_deg: dict[str, tuple[float, float]] = field(
+        default_factory=lambda: {"Down": (-14.0, -10.0), "Up": (12.0, 4.0), "In": (0.0, 0.0), "Out": (0.0, 0.0)}
+    )
+    wide_turn_deg: tuple[float, float] = (12.0, -4.0)
+    squint_share: tuple[float, float] = (0.10, 0.30)
+    free_mm: float = 24.0
+
+
+@dataclass(frozen=True)
+class EyeShapes:
+    """deltas (s, n, 3) of the template's shapes, those of the eyes made anew; extras name -> (n, 3): in-betweens
+    "name@0.5" and correctives "a+b"; in_betweens and correctives as in data.Rig."""
+
+    deltas: np.ndarray
+    extras: dict[str, np.ndarray]
+    in_betweens: dict[str, dict[float, str]]
+    correctives: dict[str, tuple[str, ...]]
+
+
+def solve_eyes(face, deltas, options=None):
+    """EyeShapes of a Face with its parts in place and its transferred shapes deltas (s, n, 3) mm."""
+    options = options or EyeShapeOptions()
+    names = list(face.template.shape_names)
+    result = np.array(deltas)
+    extras, in_betweens, correctives = {}, {}, {}
+    for side in ("left", "right"):
+        eye = _Eye(face, side, options)
+        for name, poses in eye.shapes(names, deltas).items():
+            result[names.index(name)] = poses[1.0]
+            if HALF in poses:
+                extras[in_between_name(name, HALF)] = poses[HALF]
+                in_betweens[name] = {HALF: in_between_name(name, HALF)}
+        blink = f"eyeBlink{side.capitalize()}"
+        if blink not in names:
+            continue
+        for other in eye.partners(names):
+            target = corrective_name((blink, other))
+            extras[target] = eye.corrective(result[names.index(blink)], result[names.index(other)], other)
+            correctives[target] = (blink, other)
+        for pair in eye.diagonals(names):
+            target = corrective_name(pair)
+            extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
+            correctives[target] = pair
+    return EyeShapes(result, extras, in_betweens, correctives)
+
+
+class _Eye:
+    """One eye of a face: its lids and its ball."""
+
+    def __init__(self, face, side, options):
+        self.face, self.side, self.options = face, side, options
+        skin = face.template.skin
+        self.skin = skin.vertex_slice
+        self.V = face.vertices[self.skin]
+        self.ball = carried_eyeball(face.template, face.vertices, side)
+        upper, lower = face.lines[f"lid_upper_{side}"], face.lines[f"lid_lower_{side}"]
+        faces = face.template.faces[skin.face_slice]
+        # With their mirror images, so that both eyes are treated alike however their quads are cut.
+        faces = np.concatenate([faces, face.template.mirror[faces][:, [0, 2, 1]]])
+        socket = face.regions[f"socket_{side}"][self.skin]
+        held = face.regions["mouth_interior"][self.skin] | face.regions["nostrils"][self.skin]
+        margin = self.V[np.concatenate([upper, lower])]
+        distance = np.linalg.norm(self.V[:, None] - margin[None, ::3], axis=2).min(axis=1)
+        free = (distance < options.free_mm) & ~held & ~(socket & (distance > 0.5 * options.free_mm))
+        self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
+        self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
+
+    def shapes(self, names, deltas):
+        """shape name -> {weight: (n, 3) delta} of this eye's shapes that the template has."""
+        side = self.side.capitalize()
+        made = {f"eyeBlink{side}": self._blink, f"eyeWide{side}": self._wide}
+        found = {name: {w: self._full(make(w)) for w in (HALF, 1.0)} for name, make in made.items() if name in names}
+        squint = f"eyeSquint{side}"
+        if squint in names:
+            own = deltas[names.index(squint), self.skin]
+            found[squint] = {1.0: self._full(self._squint(own))}
+        for name, direction in look_shapes(self.side).items():
+            if name in names:
+                own = deltas[names.index(name), self.skin]
+                found[name] = {w: self._look(direction, own, w) for w in (HALF, 1.0)}
+        return found
+
+    def partners(self, names):
+        """Names of the shapes that need a corrective with this eye's blink."""
+        side = self.side.capitalize()
+        wanted = [*look_shapes(self.side), f"eyeSquint{side}", f"eyeWide{side}", f"cheekSquint{side}"]
+        return [name for name in wanted if name in names]
+
+    def corrective(self, blink, other, name):
+        """(n, 3) what blink and another shape lack together: margins that meet, skin off the turned ball."""
+        pose = self.V + blink[self.skin] + other[self.skin]
+        direction = look_shapes(self.side).get(name)
+        ball = turned_ball(self.ball, gaze_rotation(direction, self.side)) if direction else self.ball
+        closed = pose
+        for _ in range(_ROUNDS):
+            # The lower lid is right, it has been pushed there; the upper follows. Each round corrects what the turned
+            # margins have slid along the axis.
+            open_u, open_l = self.lids.opening(closed)
+            closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball)
+        return self._full(closed - pose + self.V)
+
+    def diagonals(self, names):
+        """Pairs of look shapes that add up to a look past a corner of the eye."""
+        side = self.side.capitalize()
+        pairs = [(f"eyeLook{a}{side}", f"eyeLook{b}{side}") for a in ("In", "Out") for b in ("Down", "Up")]
+        return [pair for pair in pairs if set(pair) <= set(names)]
+
+    def diagonal(self, pair, shapes):
+        """(n, 3) what lifts the lids off a cornea that looks past a corner; shapes: the pair's (n, 3) deltas."""
+        pose = self.V + sum(shape[self.skin] for shape in shapes)
+        looks = look_shapes(self.side)
+        axis = self.ball.axis + sum(
+            gaze_rotation(looks[name], self.side) @ self.ball.axis - self.ball.axis for name in pair
+        )
+        ball = replace(self.ball, axis=axis / np.linalg.norm(axis))
+        return self._full(self.lids.lifted(pose, ball) - pose + self.V)
+
+    def _blink(self, weight):
+        open_u, open_l = self.lids.opening(self.V)
+        share = self.options.lids.upper_share
+        return self.lids.turned(self.V, -weight * share * open_u, weight * (1 - share) * open_l)
+
+    def _wide(self, weight):
+        return self._by_degrees(self.V, self.options.wide_turn_deg, weight, self.ball)
+
+    def _squint(self, own):
+        open_u, open_l = self.lids.opening(self.V)
+        pose = self.V + own
+        upper, lower = self.lids.upper, self.lids.lower
+        wanted_u = self.lids.angles(self.V[upper]) - self.options.squint_share[0] * open_u
+        wanted_l = self.lids.angles(self.V[lower]) + self.options.squint_share[1] * open_l
+        turn_u = wanted_u - self.lids.angles(pose[upper])
+        turn_l = wanted_l - self.lids.angles(pose[lower])
+        return self.lids.turned(pose, turn_u, turn_l)
+
+    def _look(self, direction, own, weight):
+        R = gaze_rotation(direction, self.side, weight)
+        turns = self.options.look_turn_deg[direction]
+        pose = self.V if any(turns) else self.V + weight * own
+        full = self._full(self._by_degrees(pose, turns, weight, turned_ball(self.ball, R)))
+        for part in eye_parts(self.face.template, self.side):
+            offset = self.face.vertices[part.vertex_slice] - self.ball.center
+            full[part.vertex_slice] = offset @ R.T - offset
+        return full
+
+    def _by_degrees(self, pose, degrees, weight, ball):
+        upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
+        return self.lids.turned(pose, upper, lower, ball)
+
+    def _full(self, pose):
+        """(n, 3) delta of all parts from a pose of the skin."""
+        delta = np.zeros(self.face.vertices.shape)
+        delta[self.skin] = pose - self.V
+        delta[np.abs(delta).max(axis=1) < 1e-4] = 0.0
+        return delta
+
+
+def _profile(chain):
+    """(k,) 0 at the canthi, 1 over the middle of a margin."""
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** 0.6

@@ -1,0 +1,134 @@
+"""Eyelids as shells that turn about the eyeball.
+
+A lid is a thin shell that slides over a ball. Every motion of it is therefore a field of angles about one axis, from
+canthus to canthus through the eye's centre (after "Digital Emily"-style rigs; design: the margin's angle is what an
+animator means by how far an eye is open). The field has given values on the two margins and fades over the skin around
+(biharmonic, mesh.spread); the skin then turns, and is lifted where the cornea stands higher than the lid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facewright.mesh.spread import spread_smoothly
+from facewright.transfer.eyeball import lid_clearance
+
+
+@dataclass(frozen=True)
+class LidMotionOptions:
+    """upper_share   of the way to the closing line that the upper lid goes, the lower goes the rest
+    gap_mm        of the margins from the ball when they move
+    skin_clear_mm of the outer lid skin from the ball
+    reach_mm      how far over the skin a margin's turn is felt: 26 would drag the brow, much less leaves an edge
+    soft_mm       width over which the lift off the ball sets in
+    """
+
+    upper_share: float = 0.8
+    gap_mm: float = 0.15
+    skin_clear_mm: float = 0.6
+    reach_mm: float = 10.0
+    soft_mm: float = 0.1
+
+
+class Lids:
+    """The two lids of one eye of a head.
+
+    vertices (n, 3) mm the neutral skin; faces (m, 3) of it; upper, lower: ordered margin vertices from one canthus to
+    the other; free (n,) bool skin that may move; outer (n,) bool skin that must stay off the ball (all but the socket)
+    ball  transfer.eyeball.Eyeball
+    """
+
+    def __init__(self, vertices, faces, upper, lower, free, outer, ball, options=None):
+        self.V, self.F, self.ball = vertices, faces, ball
+        self.options = options or LidMotionOptions()
+        self.upper, self.lower = np.asarray(upper), np.asarray(lower)
+        self.free = free
+        self.axis, self.forward, self.up = _frame(vertices[self.upper], vertices[self.lower], ball.center)
+        self.margin = np.unique(np.concatenate([self.upper, self.lower]))
+        self.canthi = np.intersect1d(self.upper, self.lower)
+        self.skin = np.flatnonzero(outer & free)
+        clear = lid_clearance(
+            vertices[self.skin], vertices[self.margin], self.options.gap_mm, self.options.skin_clear_mm
+        )
+        # Nothing is asked for that the neutral does not have: the corners lie deep and stay so.
+        self.clear = np.minimum(clear, np.maximum(ball.gap(vertices[self.skin]), self.options.gap_mm))
+        self._corner = np.isin(self.skin, self.canthi)
+
+    def angles(self, points):
+        """(k,) radians of elevation of points (k, 3) about the axis, 0 straight ahead."""
+        offset = points - self.ball.center
+        return np.arctan2(offset @ self.up, offset @ self.forward)
+
+    def opening(self, pose):
+        """(u,), (l,) radians by which each upper margin point stands above the lower margin and each lower point below
+        the upper one, at the same place along the axis, in a pose (n, 3)."""
+        at = pose @ self.axis
+        theta_u, theta_l = self.angles(pose[self.upper]), self.angles(pose[self.lower])
+        below = _along(at[self.upper], at[self.lower], theta_l)
+        above = _along(at[self.lower], at[self.upper], theta_u)
+        return theta_u - below, above - theta_l
+
+    def turned(self, pose, upper_turn, lower_turn, ball=None):
+        """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them."""
+        field = self.field(upper_turn, lower_turn)
+        return self.lifted(self.rotated(pose, field), ball)
+
+    def field(self, upper_turn, lower_turn):
+        """(n,) radians: the margins' turns spread over the skin around."""
+        values = np.zeros(len(self.V))
+        values[self.lower] = lower_turn
+        values[self.upper] = upper_turn
+        values[self.canthi] = 0.0
+        handles = self.margin
+        spread = spread_smoothly(self.V, self.F, handles, values[handles][:, None], self.free, self.options.reach_mm)
+        return spread[:, 0]
+
+    def rotated(self, pose, field):
+        """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
+        offset = pose - self.ball.center
+        c, s = np.cos(field)[:, None], np.sin(field)[:, None]
+        axis = -self.axis
+        along = (offset @ axis)[:, None] * axis
+        return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
+
+    def lifted(self, pose, ball=None):
+        """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be."""
+        ball = ball or self.ball
+        points = pose[self.skin]
+        missing = self.clear - ball.gap(points)
+        width = self.options.soft_mm
+        lift = 0.5 * (missing + np.sqrt(missing**2 + width**2))
+        rest = self.clear - self.ball.gap(self.V[self.skin])
+        lift -= 0.5 * (rest + np.sqrt(rest**2 + width**2))
+        lift = np.maximum(lift, 0.0)
+        lift[self._corner] = 0.0
+        lift[np.linalg.norm(pose[self.skin] - self.V[self.skin], axis=1) < 1e-3] = 0.0
+        result = pose.copy()
+        outward = points - ball.center
+        result[self.skin] += outward * (lift / np.linalg.norm(outward, axis=1))[:, None]
+        return result
+
+    def met(self, pose, upper_share=None, ball=None):
+        """The pose (n, 3) with its margins turned until they meet, the upper going upper_share of the way."""
+        share = self.options.upper_share if upper_share is None else upper_share
+        open_u, open_l = self.opening(pose)
+        return self.turned(pose, -share * open_u, (1 - share) * open_l, ball)
+
+
+def _frame(upper, lower, center):
+    """Unit axis (towards +X), forward and up of an eye: the axis from canthus to canthus."""
+    ends = np.array([0.5 * (upper[0] + lower[0]), 0.5 * (upper[-1] + lower[-1])])
+    axis = ends[1] - ends[0] if ends[1, 0] > ends[0, 0] else ends[0] - ends[1]
+    axis = axis / np.linalg.norm(axis)
+    middle = np.concatenate([upper, lower]).mean(axis=0) - center
+    forward = middle - (middle @ axis) * axis
+    forward /= np.linalg.norm(forward)
+    return axis, forward, np.cross(forward, axis)
+
+
+def _along(wanted, places, values):
+    """Values (k,) at places along the axis, read at wanted; flat beyond the ends."""
+    order = np.argsort(places)
+    return np.interp(wanted, places[order], values[order])

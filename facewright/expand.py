@@ -1,0 +1,34 @@
+"""The one rule for in-betweens and correctives: pose weights to the weights of all targets.
+
+web/expand.mjs says the same in JavaScript; a test keeps the two equal.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+
+def expand_weights(pose_weights, in_betweens, correctives):
+    """dict target -> weight of every target that plays a part, from dict shape -> weight.
+
+    in_betweens  shape -> {weight: target}: targets the shape passes on its way to 1; each acts by a hat function that
+                 is 1 at its own weight and 0 at its neighbours'. Outside 0..1 the nearest piece goes on.
+    correctives  target -> drivers: acts with the product of the drivers' weights, each clipped to 0..1
+    """
+    result = {}
+    for name, weight in pose_weights.items():
+        steps = {float(w): target for w, target in in_betweens.get(name, {}).items()}
+        stops = [0.0, *sorted(steps), 1.0]
+        targets = {**steps, 1.0: name}
+        piece = next((pair for pair in pairwise(stops) if weight <= pair[1]), (stops[-2], 1.0))
+        share = (weight - piece[0]) / (piece[1] - piece[0])
+        for stop, part in zip(piece, (1.0 - share, share)):
+            if stop > 0.0 and part != 0.0:
+                result[targets[stop]] = result.get(targets[stop], 0.0) + part
+    for target, drivers in correctives.items():
+        product = 1.0
+        for driver in drivers:
+            product *= min(max(pose_weights.get(driver, 0.0), 0.0), 1.0)
+        if product != 0.0:
+            result[target] = result.get(target, 0.0) + product
+    return result

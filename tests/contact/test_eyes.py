@@ -1,0 +1,79 @@
+"""Lids close on the ball, stay out of it along the way, and are mirror images."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from facewright.contact import solve_eyes
+from facewright.contact.gaze import gaze_rotation
+from facewright.evaluate.eyes import margin_gap_mm
+from facewright.expand import expand_weights
+from facewright.parts import fit_parts
+from facewright.transfer import transfer_shapes
+from facewright.transfer.eyeball import carried_eyeball
+
+
+@pytest.fixture(scope="module")
+def solved(hm08, hm08_person):
+    """The template itself and a person, each with their eye shapes."""
+    own = replace(hm08_person(0), vertices=hm08.vertices)
+    person = fit_parts(hm08_person(4))
+    return [(own, solve_eyes(own, hm08.deltas)), (person, solve_eyes(person, transfer_shapes(person)))]
+
+
+def posed(face, eyes, weights):
+    """(n, 3) the head under pose weights, played with in-betweens and correctives."""
+    targets = dict(zip(face.template.shape_names, eyes.deltas)) | eyes.extras
+    played = expand_weights(weights, eyes.in_betweens, eyes.correctives)
+    return face.vertices + sum(weight * targets[name] for name, weight in played.items())
+
+
+def outer_lid(face, side):
+    near = np.linalg.norm(face.vertices - carried_eyeball(face.template, face.vertices, side).center, axis=1) < 20
+    return np.flatnonzero(face.regions["eyes"] & near & ~face.regions[f"socket_{side}"])
+
+
+@pytest.mark.parametrize("weight", [0.25, 0.5, 0.75, 1.0])
+def test_a_blink_stays_out_of_the_ball(solved, weight):
+    for face, eyes in solved:
+        ball = carried_eyeball(face.template, face.vertices, "left")
+        points = posed(face, eyes, {"eyeBlinkLeft": weight})[outer_lid(face, "left")]
+        assert ball.gap(points).min() > -0.2
+
+
+def test_a_blink_closes(solved):
+    for face, eyes in solved:
+        pose = posed(face, eyes, {"eyeBlinkLeft": 1.0})
+        upper, lower = (pose[face.lines[f"lid_{lid}_left"]] for lid in ("upper", "lower"))
+        assert margin_gap_mm(upper, lower) < 0.4
+
+
+def test_eyeballs_turn_rigidly_by_the_stated_angles(solved):
+    for face, eyes in solved:
+        part = face.template.part("eye_left").vertex_slice
+        center = carried_eyeball(face.template, face.vertices, "left").center
+        for direction in ("In", "Out", "Down", "Up"):
+            moved = posed(face, eyes, {f"eyeLook{direction}Left": 1.0})[part] - center
+            turned = (face.vertices[part] - center) @ gaze_rotation(direction, "left").T
+            assert np.abs(moved - turned).max() < 1e-9
+            half = posed(face, eyes, {f"eyeLook{direction}Left": 0.25})[part] - center
+            shrunk = np.linalg.norm(half, axis=1) / np.linalg.norm(moved, axis=1)
+            assert shrunk.min() > 0.99
+
+
+def test_left_is_the_mirror_of_right(hm08, solved):
+    _, eyes = solved[0]
+    targets = dict(zip(hm08.shape_names, eyes.deltas)) | eyes.extras
+    for name, delta in targets.items():
+        if name.startswith("eye") and "Left" in name:
+            other = targets[name.replace("Left", "Right")]
+            assert np.abs(delta - other[hm08.mirror] * [-1, 1, 1]).max() < 0.01, name
+
+
+def test_only_the_lids_move(hm08, solved):
+    face, eyes = solved[0]
+    moved = np.abs(eyes.deltas[hm08.shape_names.index("eyeBlinkLeft")]).max(axis=1) > 1e-4
+    margin = face.vertices[np.concatenate([face.lines["lid_upper_left"], face.lines["lid_lower_left"]])]
+    distance = np.linalg.norm(face.vertices[moved][:, None] - margin[None], axis=2).min(axis=1)
+    assert distance.max() < 30 and not moved[hm08.part("eye_left").vertex_slice].any()

@@ -1,0 +1,56 @@
+"""In-betweens act by hat functions, correctives by the product of their drivers."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facewright.expand import expand_weights
+
+STEPS = {"blink": {0.5: "blink@0.5"}, "jaw": {0.25: "jaw@0.25", 0.75: "jaw@0.75"}}
+PAIRS = {"blink+squint": ("blink", "squint"), "all": ("blink", "squint", "jaw")}
+TWIN = Path(__file__).resolve().parents[1] / "facewright" / "web" / "expand.mjs"
+
+
+@pytest.mark.parametrize(
+    ("weight", "wanted"),
+    [
+        (0.25, {"blink@0.5": 0.5}),
+        (0.5, {"blink@0.5": 1.0}),
+        (0.75, {"blink@0.5": 0.5, "blink": 0.5}),
+        (1.0, {"blink": 1.0}),
+        (0.0, {}),
+    ],
+)
+def test_hats(weight, wanted):
+    assert expand_weights({"blink": weight}, STEPS, PAIRS) == wanted
+
+
+def test_weights_of_a_path_sum_to_one_past_the_first_step():
+    for weight in np.linspace(0.25, 1.0, 7):
+        assert sum(expand_weights({"jaw": weight}, STEPS, {}).values()) == pytest.approx(1.0)
+
+
+def test_products_and_clipping():
+    found = expand_weights({"blink": 0.5, "squint": 2.0, "jaw": -1.0}, {}, PAIRS)
+    assert found["blink+squint"] == 0.5 and "all" not in found and found["squint"] == 2.0
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_javascript_twin_says_the_same():
+    rng = np.random.default_rng(0)
+    poses = [dict(zip(("blink", "squint", "jaw", "smile"), rng.uniform(-0.2, 1.2, 4))) for _ in range(50)]
+    poses += [{"blink": 0.5}, {"jaw": 0.25, "blink": 1.0}, {}]
+    code = (
+        f"import {{ expandWeights }} from {json.dumps(TWIN.as_uri())};"
+        f"const [poses, steps, pairs] = {json.dumps([poses, STEPS, PAIRS])};"
+        "console.log(JSON.stringify(poses.map((pose) => expandWeights(pose, steps, pairs))));"
+    )
+    run = subprocess.run(["node", "--input-type=module", "-e", code], capture_output=True, text=True, check=True)
+    for pose, theirs in zip(poses, json.loads(run.stdout)):
+        ours = expand_weights(pose, STEPS, PAIRS)
+        assert ours.keys() == theirs.keys()
+        assert all(ours[name] == pytest.approx(theirs[name], abs=1e-12) for name in ours)
