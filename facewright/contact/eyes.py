@@ -7,9 +7,10 @@ the two, brings the margins together again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from facewright.contact.gaze import gaze_rotation, look_shapes, turned_ball
 from facewright.contact.lids import LidMotionOptions, Lids
@@ -123,13 +124,22 @@ class _Eye:
         pose = self.V + blink[self.skin] + other[self.skin]
         direction = look_shapes(self.side).get(name)
         ball = turned_ball(self.ball, gaze_rotation(direction, self.side)) if direction else self.ball
-        closed = pose
+        closed = self._turned_both(direction, ball) if direction else pose
         for _ in range(_ROUNDS):
             # The lower lid is right, it has been pushed there; the upper follows. Each round corrects what the turned
             # margins have slid along the axis.
             open_u, open_l = self.lids.opening(closed)
             closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball)
-        return self._full(closed - pose + self.V)
+        return self._full(self.lids.flush(closed) - pose + self.V)
+
+    def _turned_both(self, direction, ball):
+        """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
+        upper, lower = (
+            np.radians(turn) * profile for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
+        )
+        open_u, open_l = self.lids.opening(self.V)
+        share = self.options.lids.upper_share
+        return self.lids.turned(self.V, upper - share * open_u, lower + (1 - share) * open_l, ball)
 
     def diagonals(self, names):
         """Pairs of look shapes that add up to a look past a corner of the eye."""
@@ -141,16 +151,20 @@ class _Eye:
         """(n, 3) what lifts the lids off a cornea that looks past a corner; shapes: the pair's (n, 3) deltas."""
         pose = self.V + sum(shape[self.skin] for shape in shapes)
         looks = look_shapes(self.side)
-        axis = self.ball.axis + sum(
-            gaze_rotation(looks[name], self.side) @ self.ball.axis - self.ball.axis for name in pair
-        )
-        ball = replace(self.ball, axis=axis / np.linalg.norm(axis))
-        return self._full(self.lids.lifted(pose, ball) - pose + self.V)
+        turns = [gaze_rotation(looks[name], self.side) for name in pair]
+        R = Rotation.from_rotvec(sum(Rotation.from_matrix(turn).as_rotvec() for turn in turns)).as_matrix()
+        full = self._full(self.lids.lifted(pose, turned_ball(self.ball, R)) - pose + self.V)
+        # Two turns added up as chords swell the ball: it gets the one turn that they mean.
+        missing = R - turns[0] - turns[1] + np.eye(3)
+        for part in eye_parts(self.face.template, self.side):
+            full[part.vertex_slice] = (self.face.vertices[part.vertex_slice] - self.ball.center) @ missing.T
+        return full
 
     def _blink(self, weight):
         open_u, open_l = self.lids.opening(self.V)
         share = self.options.lids.upper_share
-        return self.lids.turned(self.V, -weight * share * open_u, weight * (1 - share) * open_l)
+        pose = self.lids.turned(self.V, -weight * share * open_u, weight * (1 - share) * open_l)
+        return self.lids.flush(pose) if weight == 1.0 else pose
 
     def _wide(self, weight):
         return self._by_degrees(self.V, self.options.wide_turn_deg, weight, self.ball)

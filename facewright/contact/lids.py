@@ -110,11 +110,16 @@ class Lids:
         result[self.skin] += outward * (lift / np.linalg.norm(outward, axis=1))[:, None]
         return result
 
-    def met(self, pose, upper_share=None, ball=None):
-        """The pose (n, 3) with its margins turned until they meet, the upper going upper_share of the way."""
-        share = self.options.upper_share if upper_share is None else upper_share
-        open_u, open_l = self.opening(pose)
-        return self.turned(pose, -share * open_u, (1 - share) * open_l, ball)
+    def flush(self, pose):
+        """The pose (n, 3) of closed lids with both margins equally far from the centre where they meet."""
+        at = pose @ self.axis
+        radius = np.linalg.norm(pose - self.ball.center, axis=1)
+        result = pose.copy()
+        for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
+            wanted = 0.5 * (radius[own] + _along(at[own], at[other], radius[other]))
+            offset = pose[own] - self.ball.center
+            result[own] = self.ball.center + offset * (wanted / radius[own])[:, None]
+        return result
 
 
 def _frame(upper, lower, center):
