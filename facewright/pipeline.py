@@ -234,16 +234,17 @@ def _transfer(run, face, template):
     def work():
         eyes = solve_eyes(face, transfer_shapes(face))
         info = {"names": list(template.shape_names), "extras": list(eyes.extras)}
-        info["in_betweens"] = {name: list(map(list, steps.items())) for name, steps in eyes.in_betweens.items()}
-        info["correctives"] = {name: list(drivers) for name, drivers in eyes.correctives.items()}
+        # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
+        info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in eyes.in_betweens.items()]
+        info["correctives"] = [[name, list(drivers)] for name, drivers in eyes.correctives.items()]
         return {"deltas": eyes.deltas, "extras": np.array(list(eyes.extras.values()))}, info
 
     arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
     return EyeShapes(
         arrays["deltas"],
         dict(zip(info["extras"], arrays["extras"])),
-        {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"].items()},
-        {name: tuple(drivers) for name, drivers in info["correctives"].items()},
+        {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"]},
+        {name: tuple(drivers) for name, drivers in info["correctives"]},
     )
 
 
