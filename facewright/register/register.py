@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from facewright.data import Face
+from facewright.mesh.intersect import self_intersections
 from facewright.mesh.openness import vertex_openness
 from facewright.mesh.untangle import untangled
 from facewright.register.correspond import Target
@@ -25,6 +26,8 @@ SIDES = {"left": "Left", "right": "Right"}
 # How far a smile strays from rest, and shut lids from the template's blink.
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
+# Vertices at either end of a lip seam that may give way where both lips run into the corner; the seam first holds.
+LOOSE_ENDS = (0, 2, 4)
 KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
@@ -65,16 +68,14 @@ def register(scan, landmarks, template, options=None, placed=()):
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
     interior, outer, led = _interior(template)
     fit = model.vertices.copy()
-    steady = ~np.any([template.regions[name][:stop] for name in KNOTTY], axis=0)
-    steady[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
-    fit[:stop] = untangled(tuck_interior(skin, faces, interior, outer, led), faces, steady)
+    fit[:stop] = _without_knots(template, tuck_interior(skin, faces, interior, outer, led), faces)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
         rest, removed = take_out_expression(template, model, fit[:stop], expression)
         if removed:
             neutral = model.rest.copy()
-            neutral[:stop] = untangled(tuck_interior(rest, faces, interior, outer, led), faces, steady)
+            neutral[:stop] = _without_knots(template, tuck_interior(rest, faces, interior, outer, led), faces)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
@@ -133,6 +134,26 @@ def _fit_model(template, target, pairs, closed, options):
         options,
     )
     return model, names
+
+
+def _without_knots(template, skin, faces):
+    """Skin (n, 3) with the knots of lips and lids smoothed away; of the LOOSE_ENDS the first that leaves fewest."""
+    n = len(skin)
+    knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
+    in_face = template.regions["face"][:n][faces].all(axis=1)
+    best, fewest = skin, np.inf
+    for loose in LOOSE_ENDS:
+        keep = ~knotty
+        for line in ("lip_seam_upper", "lip_seam_lower"):
+            seam = template.lines[line]
+            keep[seam[loose : len(seam) - loose]] = True
+        tried = untangled(skin, faces, keep)
+        left = int(in_face[self_intersections(tried, faces)].any(axis=1).sum())
+        if left < fewest:
+            best, fewest = tried, left
+        if left == 0:
+            break
+    return best
 
 
 def _hidden(rules, observed):
