@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from facewright.data import Face
+from facewright.mesh.adjacency import dilate
 from facewright.mesh.intersect import self_intersections
 from facewright.mesh.openness import vertex_openness
 from facewright.mesh.untangle import untangled
@@ -26,8 +27,8 @@ SIDES = {"left": "Left", "right": "Right"}
 # How far a smile strays from rest, and shut lids from the template's blink.
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
-# Vertices at either end of a lip seam that may give way where both lips run into the corner; the seam first holds.
-LOOSE_ENDS = (0, 2, 4)
+# Rings of vertices around a knot in which everything gives way, tried in turn.
+GIVING_WAY = (0, 1, 2, 3)
 KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
@@ -137,23 +138,42 @@ def _fit_model(template, target, pairs, closed, options):
 
 
 def _without_knots(template, skin, faces):
-    """Skin (n, 3) with the knots of lips and lids smoothed away; of the LOOSE_ENDS the first that leaves fewest."""
+    """Skin (n, 3) with the knots of lips and lids smoothed away.
+
+    The lip seam and the skin beside them hold; only where a knot does not come loose, what lies around it gives way too.
+    """
     n = len(skin)
     knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
+    seam = np.zeros(n, bool)
+    seam[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
     in_face = template.regions["face"][:n][faces].all(axis=1)
-    best, fewest = skin, np.inf
-    for loose in LOOSE_ENDS:
-        keep = ~knotty
-        for line in ("lip_seam_upper", "lip_seam_lower"):
-            seam = template.lines[line]
-            keep[seam[loose : len(seam) - loose]] = True
-        tried = untangled(skin, faces, keep)
-        left = int(in_face[self_intersections(tried, faces)].any(axis=1).sum())
-        if left < fewest:
-            best, fewest = tried, left
-        if left == 0:
+
+    def crossing(vertices):
+        pairs = self_intersections(vertices, faces)
+        return np.unique(pairs[in_face[pairs].any(axis=1)])
+
+    best = untangled(skin, faces, ~knotty | seam)
+    left = crossing(best)
+    knot = np.zeros(n, bool)
+    knot[faces[left].ravel()] = True
+    for rings in GIVING_WAY:
+        if not len(left):
             break
+        tried = _closed_as(skin, untangled(skin, faces, (~knotty | seam) & ~dilate(knot, faces, rings)), template)
+        remaining = crossing(tried)
+        if len(remaining) < len(left):
+            best, left = tried, remaining
     return best
+
+
+def _closed_as(before, after, template):
+    """Skin (n, 3) after smoothing, with paired lip points as far apart as they were before."""
+    upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
+    half = (before[upper] - before[lower]) / 2
+    middle = (after[upper] + after[lower]) / 2
+    closed = after.copy()
+    closed[upper], closed[lower] = middle + half, middle - half
+    return closed
 
 
 def _hidden(rules, observed):
