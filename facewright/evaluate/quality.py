@@ -14,7 +14,7 @@ from facewright.mesh.raster import Camera, RayScene
 
 SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
-RIM_MM = 2.0
+RIM_MM, LIP_RIM_MM = 2.0, 1.0
 FINE = 5  # rays along the side of a pixel that is looked at closely
 CANTHI = ("mp133", "mp33", "mp362", "mp263")
 
@@ -153,13 +153,19 @@ def lid_rim_faces(vertices, faces, lines, canthi=(), rim_mm=RIM_MM):
     return cKDTree(np.concatenate(margins)).query(vertices[faces].mean(axis=1))[0] < rim_mm
 
 
+def lip_rim_faces(vertices, faces, lines, rim_mm=LIP_RIM_MM):
+    """(m,) bool: faces within rim_mm of the lips' line of contact, where they turn inward."""
+    seam = np.concatenate([vertices[lines[name]] for name in ("lip_seam_upper", "lip_seam_lower")])
+    return cKDTree(seam).query(vertices[faces].mean(axis=1))[0] < rim_mm
+
+
 def measure_quality(scan, fit, template, regions=None, lines=None):
     """Soundness of a fit, as report.json has it under `registration`.
 
     scan a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template
-    returns dict folded, folded_lid_rims (apart: a scan shows a bump or the other lid where the template has the lid's
-    thickness, so its normal there says nothing), self_intersections (pairs with a face in region `face` that the
-    neutral has not), lip_gap_mm (largest), visible_mouth_mm2
+    returns dict folded, folded_lid_rims and folded_lip_rims (apart: a scan shows a bump or the other lid or lip where
+    the template has its thickness, so its normal there says nothing), self_intersections (pairs with a face in region
+    `face` that the neutral has not), lip_gap_mm (largest), visible_mouth_mm2
     """
     regions = template.regions if regions is None else regions
     lines = template.lines if lines is None else lines
@@ -170,6 +176,7 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     folded = folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)
     known = [i for i, name in enumerate(template.landmarks.names) if name in CANTHI]
     rim = lid_rim_faces(fit, faces, lines, template.landmarks.positions(fit, faces)[known])
+    lip_rim = lip_rim_faces(fit, faces, lines) & ~rim
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)
     inside = region_faces(regions["mouth_interior"], faces)
@@ -177,8 +184,9 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
         if part.name in ("teeth_upper", "teeth_lower", "tongue"):
             inside[part.face_slice] = True
     return {
-        "folded": int((~rim[folded]).sum()),
+        "folded": int((~(rim | lip_rim)[folded]).sum()),
         "folded_lid_rims": int(rim[folded].sum()),
+        "folded_lip_rims": int(lip_rim[folded].sum()),
         "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),
         "lip_gap_mm": float(gaps.max()),
         "visible_mouth_mm2": visible_interior_mm2(fit, faces, inside, middle),
