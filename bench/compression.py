@@ -61,7 +61,7 @@ def main(folder):
         seconds = time.perf_counter() - start
         figures = rmse([facezip_decode(packed, row) for row in eye], textures, covered)
         print(f"{name:28s} mean %.3f  worst %.3f  {seconds:.2f} s  {packed.memory_bytes()} bytes" % figures)
-    tiles = TextureTiles(neutral, textures, len(textures), covered.astype(np.float32))
+    tiles = TextureTiles.of(neutral, textures, covered)
     masks, _ = build_masks(mesh, tiles.grid, 53)
     search = published_search(tiles, masks, 4)[0]
     best = search.restarts(100)[0].min()

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 import time
-from dataclasses import dataclass
-from pathlib import Path
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from facewright.compress.masks import build_masks, covered_texels
-from facewright.compress.packed import Packed, quantise
+from facewright.compress.packed import Packed, textures_within
 from facewright.compress.published import (
     PermutationSearch,
     centroid_matrix,
@@ -22,11 +21,20 @@ from facewright.compress.published import (
     published_maps,
 )
 from facewright.compress.refine import Pass, gram_matrix, pca_weights, refine
-from facewright.compress.tiles import TEXELS, Grid, TextureTiles
+from facewright.compress.store import (
+    measure_tiles,
+    quantise_textures,
+    quantise_weights,
+    store_solution,
+    stored_parts,
+)
+from facewright.compress.threads import in_threads
+from facewright.compress.tiles import TEXELS, TextureTiles, scratch_file
 from facewright.errors import InputError
 
 # Above this, tiles lie in a file instead of memory.
 SCRATCH_BYTES = 3_000_000_000
+MASK_CHOICES = (13, 33, 53, 83)
 
 
 @dataclass(frozen=True)
@@ -34,11 +42,13 @@ class FacezipOptions:
     """Options of facezip().
 
     method      "refined", or "paper" for the published one
-    textures    number of difference textures, 1 to 8 (paper: 2 to 5)
+    textures    number of difference textures, 1 to 8 (paper: 2 to 5); with a budget the most that it may choose
     masks       number of masks of the published method
     iterations  passes of the refinement; 15 reach what 25 do within 3 %
     seed        of the samples and searches
     permute     False leaves the published permutation out (for comparison)
+    budget      bytes in memory, uncompressed: the number of difference textures that fits (and, of the published
+                method, the best of MASK_CHOICES)
     """
 
     method: str = "refined"
@@ -47,6 +57,7 @@ class FacezipOptions:
     iterations: int = 15
     seed: int = 0
     permute: bool = True
+    budget: int | None = None
 
 
 def facezip(
@@ -65,48 +76,96 @@ def facezip(
     """Compress aligned expression textures (FaceZip, Eq. 1-6, and beyond it a joint refinement).
 
     neutral   (h, w), (h, w, 1), (h, w, 3) or (h, w, 4), uint8 or uint16; sRGB or linear, blended as stored
-    textures  N images like it: a list, or a function n -> image with names given (each is asked for twice)
+    textures  N images like it: a list, or a function n -> image with names given (each is asked for once, in order)
     mesh      vertices (n, 3) mm, faces, uv (v up), uv_faces; tells which texels count; the paper's masks need it
     covered   (h, w) bool instead of what the mesh covers
     region    (h, w) bool: where the published method samples its masks
     priority  (h, w) >= 0: how much an error counts there; 1 is usual
     keep      names of textures that are stored exactly; one difference texture each
-    returns   Packed
-    raises    InputError where sizes or depths differ, or there are fewer textures than clusters (method paper)
+    progress  function (stage, share done)
+    returns   Packed; its report holds RMSE, seconds and the stages' times
+    raises    InputError where sizes or depths differ, there are fewer textures than clusters (method paper), or a
+              budget is too small
     """
     options = options or FacezipOptions()
-    started = time.perf_counter()
+    progress = progress or (lambda stage, share: None)
+    clock = _Clock()
     neutral = _as_image(neutral, "neutral")
     fetch = textures if callable(textures) else (lambda n: textures[n])
     names = tuple(names) if names is not None else tuple(f"texture{n}" for n in range(len(textures)))
     if not names:
         raise InputError("compress: no textures; give at least one besides the neutral")
-    layers, unique = _find_equal(neutral, fetch, names)
-    k = options.textures
-    _check(options, names, unique, keep)
-    grid = Grid(*neutral.shape[:2])
+    _check(options, names, keep)
+    scale = _texel_scale(neutral, mesh, covered, priority)
+    with scratch_file(neutral.nbytes * len(names), SCRATCH_BYTES) as path:
+        tiles = TextureTiles(neutral, len(names), scale, path)
+        layers = _read(tiles, fetch, names, clock, progress)
+        k = options.textures
+        if options.budget is not None:
+            k = textures_within(options.budget, neutral, tiles.count, options.textures)
+        if options.method == "paper" and tiles.count < k:
+            raise InputError(
+                f"compress: {tiles.count} different textures cannot form {k} clusters; "
+                "give more textures, a smaller --textures, or --method refined"
+            )
+        held = tuple(layers[names.index(name)] for name in keep)
+        with clock.stage("solving"):
+            encoded, errors = _encode(tiles, k, options, mesh, region, held, priority is None, progress)
+    report = {"method": options.method, "textures": k, **encoded.pop("report")}
+    report["rmse"] = {name: float(errors[layer]) for name, layer in zip(names, layers)}
+    report["mean_rmse"] = float(np.mean(list(report["rmse"].values())))
+    report["seconds"] = clock.seconds
+    report["covered_texels"] = int((scale > 0).sum())
+    return Packed(neutral=neutral, names=names, layers=np.array(layers), report=report, **encoded)
+
+
+class _Clock:
+    """Seconds of every stage."""
+
+    def __init__(self):
+        self.seconds = {}
+
+    @contextmanager
+    def stage(self, name):
+        started = time.perf_counter()
+        yield
+        self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - started, 4)
+
+
+def _texel_scale(neutral, mesh, covered, priority):
+    """(h, w) float32: 0 where no triangle covers the texel, else the square root of its priority."""
     if covered is None:
-        covered = (
-            np.ones(neutral.shape[:2], bool)
-            if mesh is None
-            else covered_texels(mesh.uv, mesh.uv_faces, grid.height, grid.width)
-        )
+        shape = neutral.shape[:2]
+        covered = np.ones(shape, bool) if mesh is None else covered_texels(mesh.uv, mesh.uv_faces, *shape)
     if not covered.any():
         raise InputError("compress: no texel is covered by the mesh; check its UVs")
     scale = covered.astype(np.float32)
     if priority is not None:
         scale *= np.sqrt(np.maximum(priority, 1e-4)).astype(np.float32)
-    with _scratch(neutral.nbytes * len(unique)) as path:
-        tiles = TextureTiles(neutral, (_as_image(fetch(n), names[n]) for n in unique), len(unique), scale, path)
-        held = tuple(unique.index(_first(layers, unique, names.index(name))) for name in keep)
-        encoded = _encode(tiles, k, options, mesh, region, held, progress)
-        report = {"method": options.method, "textures": k, **encoded.pop("report")}
-        errors = measure_tiles(tiles, covered, encoded)
-    report["rmse"] = {name: float(errors[layer]) for name, layer in zip(names, layers)}
-    report["mean_rmse"] = float(np.mean(list(report["rmse"].values())))
-    report["seconds"] = round(time.perf_counter() - started, 3)
-    report["covered_texels"] = int(covered.sum())
-    return Packed(neutral=neutral, names=names, layers=np.array(layers), report=report, **encoded)
+    return scale
+
+
+def _read(tiles, fetch, names, clock, progress):
+    """Cut all textures into tiles; equal ones once. Returns the layer of each."""
+    seen, layers = {}, []
+    for n, name in enumerate(names):
+        with clock.stage("reading"):
+            image = _as_image(fetch(n), name)
+        if image.shape != tiles.shape or image.dtype != tiles.data.dtype:
+            (h, w, c), (nh, nw, nc) = image.shape, tiles.shape
+            raise InputError(
+                f"compress: {name} has {w} x {h} pixels, {c} channels, {image.dtype}, but the neutral {nw} x {nh}, "
+                f"{nc} channels, {tiles.data.dtype}; export all textures alike"
+            )
+        with clock.stage("tiling"):
+            key = hashlib.blake2b(np.ascontiguousarray(image)).digest()
+            if key not in seen:
+                seen[key] = len(seen)
+                tiles.put(seen[key], image)
+        layers.append(seen[key])
+        progress("reading", (n + 1) / len(names))
+    tiles.keep(len(seen))
+    return layers
 
 
 def _as_image(image, name):
@@ -117,41 +176,13 @@ def _as_image(image, name):
     return image
 
 
-def _find_equal(neutral, fetch, names):
-    """For every texture the layer of its weight map, and the first texture of every layer."""
-    seen, layers, unique = {}, [], []
-    for n, name in enumerate(names):
-        image = _as_image(fetch(n), name)
-        if image.shape != neutral.shape or image.dtype != neutral.dtype:
-            (h, w, c), (nh, nw, nc) = image.shape, neutral.shape
-            raise InputError(
-                f"compress: {name} has {w} x {h} pixels, {c} channels, {image.dtype}, but the neutral {nw} x {nh}, "
-                f"{nc} channels, {neutral.dtype}; export all textures alike"
-            )
-        key = hashlib.blake2b(np.ascontiguousarray(image)).digest()
-        if key not in seen:
-            seen[key] = len(unique)
-            unique.append(n)
-        layers.append(seen[key])
-    return layers, unique
-
-
-def _first(layers, unique, n):
-    return unique[layers[n]]
-
-
-def _check(options, names, unique, keep):
+def _check(options, names, keep):
     if options.method not in ("refined", "paper"):
         raise ValueError(f"method {options.method!r}: refined or paper")
     if not 1 <= options.textures <= 8:
         raise InputError(f"compress: {options.textures} difference textures; 1 to 8 are possible")
     if options.method == "paper" and options.textures > 5:
         raise InputError("compress: --method paper searches among permutations of 5 textures at most; use refined")
-    if options.method == "paper" and len(unique) < options.textures:
-        raise InputError(
-            f"compress: {len(unique)} different textures cannot form {options.textures} clusters; "
-            "give more textures, a smaller --textures, or --method refined"
-        )
     missing = [name for name in keep if name not in names]
     if missing:
         raise InputError(f"compress: --keep {missing[0]}: there is no such texture; there are {', '.join(names[:12])}")
@@ -161,41 +192,39 @@ def _check(options, names, unique, keep):
         raise InputError("compress: --keep works with --method refined only")
 
 
-class _scratch:
-    """A scratch file for tiles of so many bytes, or None where they fit memory."""
-
-    def __init__(self, size):
-        self.folder = tempfile.TemporaryDirectory(prefix="facezip-") if size > SCRATCH_BYTES else None
-
-    def __enter__(self):
-        return None if self.folder is None else os.fspath(Path(self.folder.name) / "tiles")
-
-    def __exit__(self, *_):
-        if self.folder is not None:
-            self.folder.cleanup()
-
-
-def _encode(tiles, k, options, mesh, region, held, progress):
+def _encode(tiles, k, options, mesh, region, held, plain, progress):
+    """What is stored, and the RMSE of every texture; plain is False where priorities make PCA no measure."""
     if options.method == "paper":
-        return _encode_published(tiles, k, options, mesh, region)
+        return _best_published(tiles, k, options, mesh, region, progress)
     gram = gram_matrix(tiles)
     exact = _exact_basis(tiles, gram, k, held)
     if exact is not None:
-        return _store(tiles, exact, k, exact=True, report={"solution": "exact"})
+        result = store_solution(tiles, exact, k, exact=True, report={"solution": "exact"})
+        return result, measure_tiles(tiles, result)
     start = pca_weights(gram, k)
     if held:
         start[list(held)] = 0
         start[:, : len(held)] = 0
         start[list(held), range(len(held))] = 1
-    weights, _ = refine(tiles, start, iterations=options.iterations, keep=held, progress=progress)
-    result = _store(tiles, weights, k, held=held, report={"solution": "refined"})
-    float_pca = gram.trace() - np.sort(np.linalg.eigvalsh(gram))[::-1][:k].sum()
-    if not held and _squared(tiles, result) > float_pca:
+    share = partial(progress, "refining")
+    weights, _ = refine(tiles, start, iterations=options.iterations, keep=held, progress=share)
+    result = store_solution(tiles, weights, k, held=held, report={"solution": "refined"})
+    del weights
+    errors = measure_tiles(tiles, result)
+    if plain and not held and errors.mean() > pca_rmse(tiles, gram, k).mean():
         constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
-        other = _store(tiles, constant, k, report={"solution": "pca"})
-        if _squared(tiles, other) < _squared(tiles, result):
-            return other
-    return result
+        other = store_solution(tiles, constant, k, report={"solution": "pca"})
+        other_errors = measure_tiles(tiles, other)
+        if other_errors.mean() < errors.mean():
+            return other, other_errors
+    return result, errors
+
+
+def pca_rmse(tiles, gram, k):
+    """(N,) RMSE of every texture when the k leading components are kept in float, from the (N, N) Gram matrix."""
+    values, vectors = np.linalg.eigh(gram)
+    left = np.diag(gram) - (vectors[:, -k:] ** 2 * values[-k:]).sum(axis=1)
+    return np.sqrt(np.maximum(left, 0) / (max((tiles.scale > 0).sum(), 1) * tiles.channels))
 
 
 def _exact_basis(tiles, gram, k, held):
@@ -220,65 +249,39 @@ def _exact_basis(tiles, gram, k, held):
     return np.broadcast_to(weights, (*tiles.grid.cells, n, k))
 
 
-def _store(tiles, weights, k, *, held=(), exact=False, report):
-    """Quantised weights, the difference textures that suit them best, and these quantised."""
-    weights = np.ascontiguousarray(weights.transpose(2, 0, 1, 3))  # (N, rows, columns, K)
-    codes, step, zero = _quantise_weights(weights)
-    stored = ((codes.astype(np.float32) - zero[:, None, None]) * step[:, None, None]).astype(np.float32)
-    # Few textures leave little noise to damp: a smaller ridge then costs no range.
-    ridge = (1e-6 if exact else 1e-4 if tiles.count <= 4 else 0.01) * tiles.count
-    d = Pass(tiles, k, held).textures(stored.transpose(1, 2, 0, 3), ridge)
-    parts = _quantise_textures(tiles, d, held=range(k) if exact else range(len(held)))
-    return _parts(parts, (codes, step, zero), report)
-
-
-def _parts(textures, weights, report):
-    keys = ("textures", "texture_step", "texture_zero", "weights", "weight_step", "weight_zero")
-    return {**dict(zip(keys, (*textures, *weights))), "report": report}
-
-
-def _quantise_weights(weights):
-    low, high = weights.min(axis=(1, 2)), weights.max(axis=(1, 2))
-    low, high = np.minimum(low, 0.0).astype(np.float64), np.maximum(high, 0.0).astype(np.float64)
-    codes, step, zero = quantise(weights, low[:, None, None], high[:, None, None], 255)
-    return codes, step[:, 0, 0], zero[:, 0, 0]
-
-
-def _quantise_textures(tiles, d, held=()):
-    """Codes (K, h, w, C) of D (h, w, K, C); all but held textures at their 99.99 percentile range."""
-    height, width, k, channels = d.shape
-    levels = np.iinfo(tiles.data.dtype).max
-    sample = d[:: max(1, height // 1024), :: max(1, width // 1024)].reshape(-1, k, channels)
-    sample = sample[(sample != 0).any(axis=(1, 2))]
-    sample = sample if len(sample) else np.zeros((1, k, channels), np.float32)
-    low, high = np.quantile(sample, 0.0001, axis=0), np.quantile(sample, 0.9999, axis=0)
-    for i in held:
-        low[i], high[i] = d[:, :, i].min(axis=(0, 1)), d[:, :, i].max(axis=(0, 1))
-    out = np.empty((k, height, width, channels), tiles.data.dtype)
-    steps, zeros = np.empty((k, channels)), np.empty((k, channels))
-    for i in range(k):
-        out[i], steps[i], zeros[i] = quantise(d[:, :, i], low[i], high[i], levels)
-    return out, steps, zeros
+def _best_published(tiles, k, options, mesh, region, progress):
+    if mesh is None:
+        raise InputError("compress: --method paper computes its masks on the mesh; give one with UVs")
+    counts = (options.masks,) if options.budget is None else MASK_CHOICES
+    best = None
+    for step, count in enumerate(counts):
+        result = _encode_published(tiles, k, replace(options, masks=count), mesh, region)
+        errors = measure_tiles(tiles, result)
+        if best is None or errors.mean() < best[1].mean():
+            best = result, errors
+        progress("searching", (step + 1) / len(counts))
+    return best
 
 
 def _encode_published(tiles, k, options, mesh, region):
-    if mesh is None:
-        raise InputError("compress: --method paper computes its masks on the mesh; give one with UVs")
     masks, about = build_masks(mesh, tiles.grid, options.masks, seed=options.seed, region=region)
     weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute)
     n = tiles.count
     work = Pass(tiles, k)
     flat = np.ascontiguousarray(shares).reshape(-1, n, k)
     d = np.empty((len(tiles), k, tiles.channels, TEXELS), np.float32)
-    for part in tiles.chunks():
+
+    def one(part):
         rows = flat[work.corners[part]].transpose(0, 1, 3, 2).reshape(-1, 4 * k, n)
         y = (rows @ tiles.differences(part)).reshape(-1, 4, k, tiles.channels, TEXELS)
         scale = tiles.scale[part, None]
         d[part] = (y * work.basis[:, None, None]).sum(axis=1) / np.where(scale > 0, scale, 1)
+
+    in_threads(one, tiles.chunks())
     image = tiles.grid.join(d.reshape(len(d), -1, TEXELS)).reshape(tiles.grid.height, tiles.grid.width, k, -1)
-    stored = _quantise_weights(np.ascontiguousarray(weights.transpose(2, 0, 1, 3)))
+    stored = quantise_weights(np.ascontiguousarray(weights.transpose(2, 0, 1, 3)))
     report = {**about, "permutation_cost": cost, "solution": "published"}
-    return _parts(_quantise_textures(tiles, image), stored, report)
+    return stored_parts(quantise_textures(tiles, image), stored, report)
 
 
 def published_search(tiles, masks, k, seed=0):
@@ -298,46 +301,3 @@ def published_solution(tiles, masks, k, seed=0, permute=True):
     chosen = search.permutations[state]
     weights, shares = published_maps(masks, labels, centroids, chosen)
     return weights, shares, float(search.cost(state[None])[0])
-
-
-def _predicted(tiles, encoded, part, textures, weights, work):
-    """(t, N, C, 64) 0-255 reconstruction of tiles from stored values, clipped."""
-    k = weights.shape[-1]
-    corner = weights[work.corners[part]].transpose(0, 2, 1, 3)  # (t, N, 4, K)
-    e = (textures[part][:, None] * work.basis[:, None, None]).reshape(len(corner), 4 * k, -1)
-    x = (corner.reshape(len(corner), -1, 4 * k) @ e).reshape(len(corner), -1, tiles.channels, TEXELS)
-    x += tiles.neutral[part, None] * np.float32(tiles.unit)
-    return np.clip(x, 0, 255, out=x)
-
-
-def _stored_tiles(tiles, encoded):
-    step, zero = encoded["texture_step"], encoded["texture_zero"]
-    d = [
-        tiles.grid.cut((image.astype(np.float32) - z.astype(np.float32)) * s.astype(np.float32))
-        for image, s, z in zip(encoded["textures"], step, zero)
-    ]
-    w = (encoded["weights"].astype(np.float32) - encoded["weight_zero"][:, None, None]) * encoded["weight_step"][
-        :, None, None
-    ]
-    n, k = w.shape[0], w.shape[-1]
-    flat = np.ascontiguousarray(w.transpose(1, 2, 0, 3).astype(np.float32)).reshape(-1, n, k)
-    return np.stack(d, axis=1), flat
-
-
-def measure_tiles(tiles, covered, encoded):
-    """(N,) RMSE of every texture on covered texels, 0-255, after storage, upsampling and clipping."""
-    textures, weights = _stored_tiles(tiles, encoded)
-    work = Pass(tiles, weights.shape[-1])
-    cover = tiles.grid.cut(covered[:, :, None].astype(np.float32))
-    total = np.zeros(tiles.count)
-    for part in tiles.chunks():
-        x = _predicted(tiles, encoded, part, textures, weights, work)
-        x -= tiles.data[part].astype(np.float32) * np.float32(tiles.unit)
-        x *= cover[part, None]
-        total += np.einsum("tncp,tncp->n", x, x, dtype=np.float64)
-    return np.sqrt(total / (covered.sum() * tiles.channels))
-
-
-def _squared(tiles, encoded):
-    covered = tiles.grid.join(tiles.scale)[:, :, 0] > 0
-    return float((measure_tiles(tiles, covered, encoded) ** 2).sum() * covered.sum() * tiles.channels)

@@ -54,9 +54,25 @@ class Packed:
 
     def memory_bytes(self):
         """Bytes on a graphics card without block compression: RGB or what the maps have, weights four to an RGBA."""
-        layers = len(self.weights) * -(-self.textures.shape[0] // 4) * 4
-        weights = layers * self.weights.shape[1] * self.weights.shape[2]
-        return int(self.neutral.nbytes + self.textures.nbytes + weights)
+        return memory_bytes(self.neutral, len(self.textures), len(self.weights))
+
+
+def memory_bytes(neutral, k, layers):
+    """Bytes of a neutral like this, k difference textures and so many weight maps."""
+    rows, columns = Grid(*neutral.shape[:2]).cells
+    return int(neutral.nbytes * (1 + k) + layers * -(-k // 4) * 4 * rows * columns)
+
+
+def textures_within(budget, neutral, layers, most=4):
+    """The most difference textures whose bytes stay within the budget; InputError where not even one does."""
+    for k in range(most, 0, -1):
+        if memory_bytes(neutral, k, layers) <= budget:
+            return k
+    least = memory_bytes(neutral, 1, layers)
+    raise InputError(
+        f"compress: a budget of {budget / 1e6:.2f} MB is too small; one difference texture needs {least / 1e6:.2f} MB, "
+        "so give more or smaller textures"
+    )
 
 
 def facezip_decode(packed, weights):
