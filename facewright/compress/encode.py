@@ -10,45 +10,36 @@ from functools import partial
 
 import numpy as np
 
-from facewright.compress.masks import build_masks, covered_texels
+from facewright.compress.masks import covered_texels
 from facewright.compress.packed import Packed, textures_within
-from facewright.compress.published import (
-    PermutationSearch,
-    centroid_matrix,
-    cluster_fragments,
-    coarse_grams,
-    pair_costs,
-    published_maps,
-)
-from facewright.compress.refine import Pass, gram_matrix, pca_weights, refine
+from facewright.compress.published import best_published
+from facewright.compress.refine import gram_matrix, pca_weights, refine
 from facewright.compress.store import (
     measure_tiles,
-    quantise_textures,
-    quantise_weights,
+    root_mean,
     store_solution,
-    stored_parts,
 )
-from facewright.compress.threads import in_threads
-from facewright.compress.tiles import TEXELS, TextureTiles, scratch_file
+from facewright.compress.tiles import TextureTiles, scratch_file
 from facewright.errors import InputError
 
 # Above this, tiles lie in a file instead of memory.
 SCRATCH_BYTES = 3_000_000_000
-MASK_CHOICES = (13, 33, 53, 83)
+# What a map's error may grow by when it shares weights; its own would cost N/16 bytes a texel.
+SHARED_MAY_LOSE = 0.1
 
 
 @dataclass(frozen=True)
 class FacezipOptions:
     """Options of facezip().
 
-    method      "refined", or "paper" for the published one
+    method      "refined", "paper" for the published one, or "pca" (constant weights, for comparison)
     textures    number of difference textures, 1 to 8 (paper: 2 to 5); with a budget the most that it may choose
     masks       number of masks of the published method
     iterations  passes of the refinement; 15 reach what 25 do within 3 %
     seed        of the samples and searches
     permute     False leaves the published permutation out (for comparison)
     budget      bytes in memory, uncompressed: the number of difference textures that fits (and, of the published
-                method, the best of MASK_CHOICES)
+                method, the best of some counts of masks)
     """
 
     method: str = "refined"
@@ -87,36 +78,111 @@ def facezip(
     raises    InputError where sizes or depths differ, there are fewer textures than clusters (method paper), or a
               budget is too small
     """
+    fetch = textures if callable(textures) else (lambda n: textures[n])
+    names = tuple(names) if names is not None else tuple(f"texture{n}" for n in range(len(textures)))
+    rest = {"mesh": mesh, "covered": covered, "region": region, "priority": priority, "keep": keep}
+    return _compress({"color": (neutral, fetch)}, names, options, progress, **rest)["color"]
+
+
+def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest):
+    """Compress several maps of the same expressions (albedo, specular, displacement ...), with one set of weights
+    where that pays.
+
+    maps    dict name -> (neutral, function n -> image) as facezip() takes them, all of one size; depths may differ
+    names   of the N expressions
+    share   True or False; None shares where no map's error grows by more than SHARED_MAY_LOSE
+    rest    mesh, covered, region, priority, keep as in facezip()
+    returns dict name -> Packed; maps that share have the same weights array
+    """
+    options = options or FacezipOptions()
+    if options.budget is not None:
+        images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
+        k = textures_within(options.budget, images, len(names), options.textures)
+        options = replace(options, textures=k, budget=None)
+    if len(maps) == 1 or share is False:
+        return {
+            name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
+        }
+    together = _compress(maps, tuple(names), options, progress, **rest)
+    if share:
+        return together
+    alone = facezip_maps(maps, names, share=False, options=options, progress=progress, **rest)
+    errors = {name: (together[name].report["mean_rmse"], alone[name].report["mean_rmse"]) for name in maps}
+    pays = all(shared <= own * (1 + SHARED_MAY_LOSE) for shared, own in errors.values())
+    for packed in (together, alone):
+        for name in maps:
+            packed[name].report["mean_rmse_shared"], packed[name].report["mean_rmse_alone"] = errors[name]
+    return together if pays else alone
+
+
+def _compress(maps, names, options, progress, *, mesh=None, covered=None, region=None, priority=None, keep=()):
+    """dict name -> Packed of maps that share their weights."""
     options = options or FacezipOptions()
     progress = progress or (lambda stage, share: None)
     clock = _Clock()
-    neutral = _as_image(neutral, "neutral")
-    fetch = textures if callable(textures) else (lambda n: textures[n])
-    names = tuple(names) if names is not None else tuple(f"texture{n}" for n in range(len(textures)))
     if not names:
         raise InputError("compress: no textures; give at least one besides the neutral")
     _check(options, names, keep)
-    scale = _texel_scale(neutral, mesh, covered, priority)
-    with scratch_file(neutral.nbytes * len(names), SCRATCH_BYTES) as path:
-        tiles = TextureTiles(neutral, len(names), scale, path)
-        layers = _read(tiles, fetch, names, clock, progress)
+    neutrals = {name: _as_image(neutral, f"neutral of {name}") for name, (neutral, _) in maps.items()}
+    scale = _texel_scale(next(iter(neutrals.values())), mesh, covered, priority)
+    stack = _stacked(list(neutrals.values()))
+    levels = [np.iinfo(image.dtype).max for image in neutrals.values() for _ in range(image.shape[2])]
+    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as path:
+        tiles = TextureTiles(stack, len(names), scale, path, levels)
+        layers = _read(tiles, maps, neutrals, names, clock, progress)
+        if len(maps) > 1:
+            with clock.stage("solving"):
+                tiles.balance([image.shape[2] for image in neutrals.values()])
         k = options.textures
         if options.budget is not None:
-            k = textures_within(options.budget, neutral, tiles.count, options.textures)
+            k = textures_within(options.budget, list(neutrals.values()), tiles.count, options.textures)
         if options.method == "paper" and tiles.count < k:
             raise InputError(
                 f"compress: {tiles.count} different textures cannot form {k} clusters; "
                 "give more textures, a smaller --textures, or --method refined"
             )
-        held = tuple(layers[names.index(name)] for name in keep)
+        held = tuple(dict.fromkeys(layers[names.index(name)] for name in keep))
+        plain = priority is None and len(maps) == 1
         with clock.stage("solving"):
-            encoded, errors = _encode(tiles, k, options, mesh, region, held, priority is None, progress)
-    report = {"method": options.method, "textures": k, **encoded.pop("report")}
-    report["rmse"] = {name: float(errors[layer]) for name, layer in zip(names, layers)}
-    report["mean_rmse"] = float(np.mean(list(report["rmse"].values())))
-    report["seconds"] = clock.seconds
+            encoded, errors = _encode(tiles, k, options, mesh, region, held, plain, progress)
+    report = {"method": options.method, "textures": k, **encoded.pop("report"), "seconds": clock.seconds}
     report["covered_texels"] = int((scale > 0).sum())
-    return Packed(neutral=neutral, names=names, layers=np.array(layers), report=report, **encoded)
+    return _split(encoded, errors, neutrals, names, np.array(layers), report)
+
+
+def _stacked(images):
+    """Images (h, w, C) side by side in their channels; 8 bits become 16 where depths differ."""
+    if len(images) == 1:
+        return images[0]
+    if any(image.shape[:2] != images[0].shape[:2] for image in images):
+        raise InputError("compress: the maps have different sizes; export all at one size")
+    if any(image.dtype == np.uint16 for image in images):
+        images = [image if image.dtype == np.uint16 else image.astype(np.uint16) * 257 for image in images]
+    return np.concatenate(images, axis=2)
+
+
+def _split(encoded, errors, neutrals, names, layers, report):
+    """dict name -> Packed of the channels of each map."""
+    result, first = {}, 0
+    for name, neutral in neutrals.items():
+        mine = slice(first, first + neutral.shape[2])
+        rmse = root_mean(errors[:, mine])
+        about = {**report, "rmse": {each: float(rmse[layer]) for each, layer in zip(names, layers)}}
+        about["mean_rmse"] = float(np.mean(list(about["rmse"].values())))
+        result[name] = Packed(
+            neutral=neutral,
+            textures=encoded["textures"][..., mine].astype(neutral.dtype, copy=False),
+            texture_step=encoded["texture_step"][:, mine],
+            texture_zero=encoded["texture_zero"][:, mine],
+            weights=encoded["weights"],
+            weight_step=encoded["weight_step"],
+            weight_zero=encoded["weight_zero"],
+            names=names,
+            layers=layers,
+            report=about,
+        )
+        first = mine.stop
+    return result
 
 
 class _Clock:
@@ -145,19 +211,21 @@ def _texel_scale(neutral, mesh, covered, priority):
     return scale
 
 
-def _read(tiles, fetch, names, clock, progress):
+def _read(tiles, maps, neutrals, names, clock, progress):
     """Cut all textures into tiles; equal ones once. Returns the layer of each."""
     seen, layers = {}, []
     for n, name in enumerate(names):
         with clock.stage("reading"):
-            image = _as_image(fetch(n), name)
-        if image.shape != tiles.shape or image.dtype != tiles.data.dtype:
-            (h, w, c), (nh, nw, nc) = image.shape, tiles.shape
-            raise InputError(
-                f"compress: {name} has {w} x {h} pixels, {c} channels, {image.dtype}, but the neutral {nw} x {nh}, "
-                f"{nc} channels, {tiles.data.dtype}; export all textures alike"
-            )
+            images = [_as_image(fetch(n), name) for _, fetch in maps.values()]
+        for image, neutral in zip(images, neutrals.values()):
+            if image.shape != neutral.shape or image.dtype != neutral.dtype:
+                (h, w, c), (nh, nw, nc) = image.shape, neutral.shape
+                raise InputError(
+                    f"compress: {name} has {w} x {h} pixels, {c} channels, {image.dtype}, but the neutral {nw} x {nh}, "
+                    f"{nc} channels, {neutral.dtype}; export all textures alike"
+                )
         with clock.stage("tiling"):
+            image = _stacked(images)
             key = hashlib.blake2b(np.ascontiguousarray(image)).digest()
             if key not in seen:
                 seen[key] = len(seen)
@@ -177,8 +245,8 @@ def _as_image(image, name):
 
 
 def _check(options, names, keep):
-    if options.method not in ("refined", "paper"):
-        raise ValueError(f"method {options.method!r}: refined or paper")
+    if options.method not in ("refined", "paper", "pca"):
+        raise ValueError(f"method {options.method!r}: refined, paper or pca")
     if not 1 <= options.textures <= 8:
         raise InputError(f"compress: {options.textures} difference textures; 1 to 8 are possible")
     if options.method == "paper" and options.textures > 5:
@@ -188,15 +256,18 @@ def _check(options, names, keep):
         raise InputError(f"compress: --keep {missing[0]}: there is no such texture; there are {', '.join(names[:12])}")
     if len(set(keep)) > options.textures:
         raise InputError(f"compress: {len(keep)} textures to keep, but only {options.textures} difference textures")
-    if keep and options.method == "paper":
+    if keep and options.method != "refined":
         raise InputError("compress: --keep works with --method refined only")
 
 
 def _encode(tiles, k, options, mesh, region, held, plain, progress):
-    """What is stored, and the RMSE of every texture; plain is False where priorities make PCA no measure."""
+    """What is stored, and the RMSE of every texture and channel; PCA is no measure unless plain."""
     if options.method == "paper":
-        return _best_published(tiles, k, options, mesh, region, progress)
+        return best_published(tiles, k, options, mesh, region, progress)
     gram = gram_matrix(tiles)
+    if options.method == "pca":
+        result = _store_pca(tiles, gram, k)
+        return result, measure_tiles(tiles, result)
     exact = _exact_basis(tiles, gram, k, held)
     if exact is not None:
         result = store_solution(tiles, exact, k, exact=True, report={"solution": "exact"})
@@ -211,13 +282,18 @@ def _encode(tiles, k, options, mesh, region, held, plain, progress):
     result = store_solution(tiles, weights, k, held=held, report={"solution": "refined"})
     del weights
     errors = measure_tiles(tiles, result)
-    if plain and not held and errors.mean() > pca_rmse(tiles, gram, k).mean():
-        constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
-        other = store_solution(tiles, constant, k, report={"solution": "pca"})
+    if plain and not held and root_mean(errors).mean() > pca_rmse(tiles, gram, k).mean():
+        other = _store_pca(tiles, gram, k)
         other_errors = measure_tiles(tiles, other)
-        if other_errors.mean() < errors.mean():
+        if root_mean(other_errors).mean() < root_mean(errors).mean():
             return other, other_errors
     return result, errors
+
+
+def _store_pca(tiles, gram, k):
+    start = pca_weights(gram, k)
+    constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
+    return store_solution(tiles, constant, k, report={"solution": "pca"})
 
 
 def pca_rmse(tiles, gram, k):
@@ -247,57 +323,3 @@ def _exact_basis(tiles, gram, k, held):
         solved[chosen] = np.eye(len(chosen))
         weights[:, : len(chosen)] = solved
     return np.broadcast_to(weights, (*tiles.grid.cells, n, k))
-
-
-def _best_published(tiles, k, options, mesh, region, progress):
-    if mesh is None:
-        raise InputError("compress: --method paper computes its masks on the mesh; give one with UVs")
-    counts = (options.masks,) if options.budget is None else MASK_CHOICES
-    best = None
-    for step, count in enumerate(counts):
-        result = _encode_published(tiles, k, replace(options, masks=count), mesh, region)
-        errors = measure_tiles(tiles, result)
-        if best is None or errors.mean() < best[1].mean():
-            best = result, errors
-        progress("searching", (step + 1) / len(counts))
-    return best
-
-
-def _encode_published(tiles, k, options, mesh, region):
-    masks, about = build_masks(mesh, tiles.grid, options.masks, seed=options.seed, region=region)
-    weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute)
-    n = tiles.count
-    work = Pass(tiles, k)
-    flat = np.ascontiguousarray(shares).reshape(-1, n, k)
-    d = np.empty((len(tiles), k, tiles.channels, TEXELS), np.float32)
-
-    def one(part):
-        rows = flat[work.corners[part]].transpose(0, 1, 3, 2).reshape(-1, 4 * k, n)
-        y = (rows @ tiles.differences(part)).reshape(-1, 4, k, tiles.channels, TEXELS)
-        scale = tiles.scale[part, None]
-        d[part] = (y * work.basis[:, None, None]).sum(axis=1) / np.where(scale > 0, scale, 1)
-
-    in_threads(one, tiles.chunks())
-    image = tiles.grid.join(d.reshape(len(d), -1, TEXELS)).reshape(tiles.grid.height, tiles.grid.width, k, -1)
-    stored = quantise_weights(np.ascontiguousarray(weights.transpose(2, 0, 1, 3)))
-    report = {**about, "permutation_cost": cost, "solution": "published"}
-    return stored_parts(quantise_textures(tiles, image), stored, report)
-
-
-def published_search(tiles, masks, k, seed=0):
-    """PermutationSearch of a set under masks (rows, columns, m), the labels and the centroids."""
-    _, grams = gram_matrix(tiles, blocks=True)
-    blocks, values = coarse_grams(tiles, grams, masks)
-    per_mask = np.tensordot(values.T**2, blocks, 1)
-    labels = cluster_fragments(per_mask, k, seed=seed)
-    centroids = centroid_matrix(labels, k)
-    return PermutationSearch(pair_costs(blocks, values, centroids)), labels, centroids
-
-
-def published_solution(tiles, masks, k, seed=0, permute=True):
-    """Weight maps, the shares that make the difference textures, and the permutation cost."""
-    search, labels, centroids = published_search(tiles, masks, k, seed)
-    state = search.solve(seed) if permute else np.zeros(len(labels), int)
-    chosen = search.permutations[state]
-    weights, shares = published_maps(masks, labels, centroids, chosen)
-    return weights, shares, float(search.cost(state[None])[0])

@@ -100,9 +100,9 @@ class Pass:
         out = np.empty((len(tiles), self.k * tiles.channels, TEXELS), np.float32)
 
         def one(part):
-            d, _, _ = self.solve_textures(flat, part, ridge)
-            scale = tiles.scale[part, None]
-            d = np.where(scale > 0, d / np.where(scale > 0, scale, 1), 0)
+            # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
+            # which filters and mip-maps read too, is met as well.
+            d, _, _ = self.solve_textures(flat, part, ridge, tiles.differences(part, whole=True))
             out[part] = d.reshape(len(d), -1, TEXELS)
 
         in_threads(one, tiles.chunks())

@@ -30,24 +30,24 @@ def stored_parts(textures, weights, report):
 def quantise_weights(weights):
     low, high = weights.min(axis=(1, 2)), weights.max(axis=(1, 2))
     low, high = np.minimum(low, 0.0).astype(np.float64), np.maximum(high, 0.0).astype(np.float64)
-    codes, step, zero = quantise(weights, low[:, None, None], high[:, None, None], 255)
+    codes, step, zero = quantise(weights, low[:, None, None], high[:, None, None], 255, np.uint8)
     return codes, step[:, 0, 0], zero[:, 0, 0]
 
 
 def quantise_textures(tiles, d, held=()):
-    """Codes (K, h, w, C) of D (h, w, K, C); all but held textures at their 99.99 percentile range."""
+    """Codes (K, h, w, C) of D (h, w, K, C); all but held textures at the 99.99 percentile range of covered texels."""
     height, width, k, channels = d.shape
-    levels = np.iinfo(tiles.data.dtype).max
-    sample = d[:: max(1, height // 1024), :: max(1, width // 1024)].reshape(-1, k, channels)
-    sample = sample[(sample != 0).any(axis=(1, 2))]
+    covered = tiles.grid.join(tiles.scale)[:, :, 0] > 0
+    every = (slice(None, None, max(1, height // 1024)), slice(None, None, max(1, width // 1024)))
+    sample = d[every][covered[every]]
     sample = sample if len(sample) else np.zeros((1, k, channels), np.float32)
     low, high = np.quantile(sample, 0.0001, axis=0), np.quantile(sample, 0.9999, axis=0)
     for i in held:
-        low[i], high[i] = d[:, :, i].min(axis=(0, 1)), d[:, :, i].max(axis=(0, 1))
+        low[i], high[i] = d[covered, i].min(axis=0), d[covered, i].max(axis=0)
     out = np.empty((k, height, width, channels), tiles.data.dtype)
     steps, zeros = np.empty((k, channels)), np.empty((k, channels))
     for i in range(k):
-        out[i], steps[i], zeros[i] = quantise(d[:, :, i], low[i], high[i], levels)
+        out[i], steps[i], zeros[i] = quantise(d[:, :, i], low[i], high[i], tiles.levels, tiles.data.dtype)
     return out, steps, zeros
 
 
@@ -75,7 +75,7 @@ def _difference_tiles(grid, encoded, row):
 
 
 def measure_tiles(tiles, encoded):
-    """(N,) RMSE of every texture on covered texels, 0-255, after storage, upsampling and clipping."""
+    """(N, C) RMSE of every texture and channel on covered texels, 0-255, after storage, upsampling and clipping."""
     step, zero = (encoded[key].astype(np.float32) for key in ("weight_step", "weight_zero"))
     weights = (encoded["weights"].astype(np.float32) - zero[:, None, None]) * step[:, None, None]
     weights = np.ascontiguousarray(weights.transpose(1, 2, 0, 3)).reshape(-1, tiles.count, weights.shape[-1])
@@ -85,7 +85,7 @@ def measure_tiles(tiles, encoded):
     def one(row):
         part = slice(row * columns, (row + 1) * columns)
         covered = tiles.scale[part, None] > 0
-        total = np.zeros(tiles.count)
+        total = np.zeros((tiles.count, tiles.channels))
         textures = _difference_tiles(tiles.grid, encoded, row)
         for start in range(0, columns, 96):
             some = slice(start, min(start + 96, columns))
@@ -93,9 +93,13 @@ def measure_tiles(tiles, encoded):
             x = _predicted(tiles, at, textures[some], weights, work)
             x -= tiles.data[at].astype(np.float32) * np.float32(tiles.unit)
             x *= covered[some]
-            flat = x.transpose(1, 0, 2, 3).reshape(tiles.count, -1)
-            total += [np.dot(line, line) for line in flat]
+            total += np.einsum("tncp,tncp->nc", x, x)
         return total
 
     total = sum(in_threads(one, range(tiles.grid.tiles[0])))
-    return np.sqrt(total / (max((tiles.scale > 0).sum(), 1) * tiles.channels))
+    return np.sqrt(total / max((tiles.scale > 0).sum(), 1))
+
+
+def root_mean(errors):
+    """(N,) RMSE over the channels of errors (N, C)."""
+    return np.sqrt((errors**2).mean(axis=1))

@@ -124,10 +124,14 @@ class TextureTiles:
     count     number of textures that put() may bring
     scale     (h, w) float32: 0 where no triangle covers the texel, else the square root of its priority
     scratch   file to keep the tiles in instead of memory, so that memory does not grow with N
+    levels    (C,) largest code that a channel is stored with
     """
 
-    def __init__(self, neutral, count, scale, scratch=None):
+    def __init__(self, neutral, count, scale, scratch=None, levels=None):
         self.shape = neutral.shape
+        most = np.iinfo(neutral.dtype).max
+        self.levels = np.full(neutral.shape[2], most) if levels is None else np.asarray(levels)
+        self.gain = np.ones((neutral.shape[2], 1), np.float32)  # how much a difference of a channel counts
         height, width, self.channels = neutral.shape
         self.grid = Grid(height, width)
         self.count = count
@@ -159,6 +163,17 @@ class TextureTiles:
         """Only the first textures."""
         self.data, self.count = self.data[:, :count], count
 
+    def balance(self, channels):
+        """Let the maps of so many channels each, side by side in one image, count alike, as much as the first."""
+        squares = np.zeros(self.channels)
+        for part in self.chunks():
+            x = self.differences(part).reshape(-1, self.channels, TEXELS)
+            squares += np.einsum("ncp,ncp->c", x, x, dtype=np.float64)
+        first = np.cumsum([0, *channels[:-1]])
+        rms = np.sqrt(np.add.reduceat(squares, first) / channels)
+        gain = np.where(rms > 0, rms[0] / np.where(rms > 0, rms, 1), 1) if rms[0] > 0 else np.ones(len(rms))
+        self.gain = np.repeat(gain, channels).astype(np.float32)[:, None]
+
     def __len__(self):
         return len(self.data)
 
@@ -167,9 +182,9 @@ class TextureTiles:
         size = max(8, size * 20 // max(self.count, 20))
         return [slice(start, min(start + size, len(self))) for start in range(0, len(self), size)]
 
-    def differences(self, part):
-        """(tiles, N, C * 64) float32 in 0-255, times scale."""
+    def differences(self, part, whole=False):
+        """(tiles, N, C * 64) float32 in 0-255, times scale and gain; whole: as they are, uncovered texels too."""
         x = self.data[part].astype(np.float32)
         x -= self.neutral[part, None].astype(np.float32)
-        x *= self.scale[part, None] * np.float32(self.unit)
+        x *= np.float32(self.unit) if whole else self.scale[part, None] * (self.gain * np.float32(self.unit))
         return x.reshape(len(x), self.count, self.channels * TEXELS)
