@@ -19,7 +19,7 @@ from facewright.compress.threads import THREADS, in_threads
 
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 # name: VkFormat (linear), bytes of a block, texels along its side, descriptor's colour model
-FORMATS = {"bc7": (145, 16, 4, 134), "astc": (157, 16, 4, 162), "rgba8": (37, 4, 1, 1), "r16": (70, 2, 1, 1)}
+FORMATS = {"bc7": (145, 16, 4, 134), "astc": (157, 16, 4, 162), "rgba8": (37, 4, 1, 1), "r32f": (100, 4, 1, 1)}
 PACKAGES = {"bc7": ("bc7enc", "bc7enc-py"), "astc": ("astc_encoder", "astc-encoder-py")}
 
 
@@ -103,10 +103,13 @@ def mip_levels(image):
 
 
 def texture_ktx2(image, kind):
-    """A KTX2 file, as bytes, of an image (h, w, C) with mip-maps, and its bytes on the card; 16 bits stay raw."""
+    """A KTX2 file, as bytes, of an image (h, w, C) with mip-maps, and its bytes on the card.
+
+    16 bits become floats of 0 to 1: the only format that holds them exactly and that three.js opens, at twice the size.
+    """
     levels = mip_levels(image)
     if image.dtype == np.uint16:
-        payload, kind = [level[:, :, 0].astype("<u2").tobytes() for level in levels], "r16"
+        payload, kind = [(level[:, :, 0] / np.float32(65535)).astype("<f4").tobytes() for level in levels], "r32f"
     else:
         payload = [encode_blocks(as_rgba(level), kind) for level in levels]
     return container(payload, kind, *image.shape[:2]), sum(map(len, payload))
@@ -129,7 +132,7 @@ def container(levels, kind, height, width):
         body += bytes(-(end + len(body)) % align)
         places.insert(0, (end + len(body), len(data), len(data)))
         body += data
-    header = struct.pack("<9I", vk_format, 2 if kind == "r16" else 1, width, height, 0, 0, 1, len(levels), 0)
+    header = struct.pack("<9I", vk_format, 4 if kind == "r32f" else 1, width, height, 0, 0, 1, len(levels), 0)
     index = struct.pack("<4I2Q", head, len(descriptor), head + len(descriptor), len(keys), 0, 0)
     return IDENTIFIER + header + index + b"".join(struct.pack("<3Q", *p) for p in places) + descriptor + keys + body
 
@@ -138,17 +141,17 @@ def _descriptor(kind):
     """Basic data format descriptor: linear, BT.709 primaries, alpha straight."""
     _, block, side, model = FORMATS[kind]
     if kind in ("bc7", "astc"):
-        samples = [(0, 127, 0, 0xFFFFFFFF)]
-    elif kind == "r16":
-        samples = [(0, 15, 0, 65535)]
+        samples = [(0, 127, 0, 0, 0xFFFFFFFF)]
+    elif kind == "r32f":
+        samples = [(0, 31, 0xC0, 0xBF800000, 0x3F800000)]  # signed floats, -1 and 1
     else:
-        samples = [(8 * i, 7, channel, 255) for i, channel in enumerate((0, 1, 2, 15))]
+        samples = [(8 * i, 7, channel, 0, 255) for i, channel in enumerate((0, 1, 2, 15))]
     size = 24 + 16 * len(samples)
     words = struct.pack("<3I", size + 4, 0, 2 | size << 16)
     words += struct.pack("<4B", model, 1, 1, 0) + struct.pack("<8B", side - 1, side - 1, 0, 0, block, 0, 0, 0)
     words += bytes(4)
-    for offset, length, channel, upper in samples:
-        words += struct.pack("<HBB4BII", offset, length, channel, 0, 0, 0, 0, 0, upper)
+    for offset, length, channel, lower, upper in samples:
+        words += struct.pack("<HBB4BII", offset, length, channel, 0, 0, 0, 0, lower, upper)
     return words
 
 

@@ -128,6 +128,10 @@ class PermutationSearch:
         pairs = self.table[m[:, None], m[None], states[:, None, :], states[:, :, None]]
         return pairs.sum(axis=(1, 2), dtype=np.float64) / 2
 
+    def bound(self):
+        """A cost that no state can be below: every pair of masks at its best, whatever the others want."""
+        return float(self.table.min(axis=(2, 3)).sum(dtype=np.float64) / 2)
+
     def sweep(self, states):
         """One sweep: each mask in turn takes its best permutation, the others held; in place, True where it moved."""
         moved, m = False, np.arange(self.m)

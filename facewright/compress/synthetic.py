@@ -44,37 +44,56 @@ class ExpressionSet:
     signal_rms: float
 
 
-def expression_set(size=512, count=20, *, strength=14.0, noise=2.0, seed=0):
-    """A deterministic ExpressionSet of a square size (or (height, width)).
+class ExpressionSource:
+    """Expressions drawn one at a time, the same for the same arguments, whatever the order they are asked for in.
 
+    size      of a square image, or (height, width)
     strength  amplitude of wrinkles, 0-255
     noise     standard deviation of the noise of every texture, the neutral too, 0-255
     """
-    rng = np.random.default_rng(seed)
-    height, width = (size, size) if np.isscalar(size) else size
-    clean = _neutral(height, width, rng)
-    v, u = 1 - (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
-    covered = ((u[None] - 0.5) / 0.46) ** 2 + ((v[:, None] - 0.5) / 0.48) ** 2 <= 1
-    patterns = list(_patterns(u, v, rng))
-    textures, truth, squares = [], [], 0.0
-    for n in range(count):
-        image = clean.copy()
-        for (rows, columns, pattern), weight in zip(patterns, _activation(len(patterns), rng)):
+
+    def __init__(self, size=512, *, strength=14.0, noise=2.0, seed=0):
+        self.height, self.width = (size, size) if np.isscalar(size) else size
+        self.strength, self.noise, self.seed = strength, noise, seed
+        rng = np.random.default_rng(seed)
+        self.clean = _neutral(self.height, self.width, rng)
+        v, u = _axes(self.height, self.width)
+        self.covered = ((u[None] - 0.5) / 0.46) ** 2 + ((v[:, None] - 0.5) / 0.48) ** 2 <= 1
+        self.patterns = list(_patterns(u, v, rng))
+        self.neutral = _with_noise(self.clean, noise, [seed, 2])
+        self.mesh = bowl()
+
+    def draw(self, n):
+        """Texture n (h, w, 3) uint8 and its truth (h, w, 3) float32 without noise."""
+        image = self.clean.copy()
+        weights = _activation(len(self.patterns), np.random.default_rng([self.seed, 3, n]))
+        for (rows, columns, pattern, colour), weight in zip(self.patterns, weights):
             if weight:
-                image[rows, columns] += np.float32(weight * strength) * pattern
+                image[rows, columns] += (np.float32(weight * self.strength) * pattern)[:, :, None] * colour
         image = np.clip(image, 0, 255)
-        squares += float(((image - clean)[covered] ** 2).mean())
-        truth.append(image)
-        textures.append(_with_noise(image, noise, [seed, 1, n]))
+        return _with_noise(image, self.noise, [self.seed, 1, n]), image
+
+
+def expression_set(size=512, count=20, *, strength=14.0, noise=2.0, seed=0):
+    """A deterministic ExpressionSet; arguments as of ExpressionSource."""
+    source = ExpressionSource(size, strength=strength, noise=noise, seed=seed)
+    drawn = [source.draw(n) for n in range(count)]
+    squares = [((truth - source.clean)[source.covered] ** 2).mean() for _, truth in drawn]
     return ExpressionSet(
-        neutral=_with_noise(clean, noise, [seed, 2]),
-        textures=textures,
-        truth=truth,
-        mesh=bowl(),
-        covered=covered,
+        neutral=source.neutral,
+        textures=[texture for texture, _ in drawn],
+        truth=[truth for _, truth in drawn],
+        mesh=source.mesh,
+        covered=source.covered,
         names=tuple(f"expression{n:02d}" for n in range(count)),
-        signal_rms=float(np.sqrt(squares / max(count, 1))),
+        signal_rms=float(np.sqrt(np.mean(squares))),
     )
+
+
+def _axes(height, width):
+    """v (height,) upwards and u (width,) of the texels' centres, float32."""
+    v, u = 1 - (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
+    return v.astype(np.float32), u.astype(np.float32)
 
 
 def bowl(rings=24, spokes=64):
@@ -97,7 +116,7 @@ def bowl(rings=24, spokes=64):
 
 def _neutral(height, width, rng):
     """(h, w, 3) float32: skin of uneven colour with brows, lips, freckles and pores."""
-    v, u = 1 - (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
+    v, u = _axes(height, width)
     image = np.empty((height, width, 3), np.float32)
     image[:] = SKIN
     for _ in range(30):
@@ -118,25 +137,25 @@ def _neutral(height, width, rng):
 
 
 def _patterns(u, v, rng):
-    """(rows, columns, pattern (r, c, 3)) of every wrinkle and blush, left and right apart."""
+    """(rows, columns, pattern (r, c), colour (3,)) of every wrinkle and blush, left and right apart."""
     for centre_u, centre_v, reach_u, reach_v, kinds in PLACES.values():
         for degrees, furrows in kinds:
             colour = np.float32([1.0, 0.95, 0.9]) * rng.uniform(0.8, 1.2)
             phase, bend = rng.uniform(0, 2 * np.pi), rng.uniform(-1.5, 1.5)
             for side in (-1, 1):
                 u0 = 0.5 + side * centre_u
-                rows, columns = _window(u, v, u0, centre_v, 3 * reach_u, 3 * reach_v)
+                rows, columns = _window(u, v, u0, centre_v, 2.2 * reach_u, 2.2 * reach_v)
                 x, y = side * (u[columns][None] - u0) / reach_u, (v[rows][:, None] - centre_v) / reach_v
                 turn = np.deg2rad(degrees)
                 along = np.cos(turn) * x + np.sin(turn) * y + 0.15 * bend * (x * x + y * y)
                 wave = np.sin(2 * np.pi * furrows * along / 2 + phase)
-                pattern = (np.exp(-1.5 * (x * x + y * y)) * wave).astype(np.float32)
-                yield rows, columns, pattern[:, :, None] * colour
+                pattern = np.exp(-1.5 * (x * x + y * y)) * wave
+                yield rows, columns, pattern.astype(np.float32), colour.astype(np.float32)
     for centre_u, centre_v, reach in BLUSHES:
         for side in (-1, 1) if centre_u else (1,):
             rows, columns = _window(u, v, 0.5 + side * centre_u, centre_v, 3 * reach, 3 * reach)
             blob = _blob(u[columns], v[rows], 0.5 + side * centre_u, centre_v, reach, reach)
-            yield rows, columns, blob[:, :, None] * np.float32([0.5, -0.35, -0.3])
+            yield rows, columns, blob, np.float32([0.5, -0.35, -0.3])
 
 
 def _activation(count, rng):

@@ -52,7 +52,8 @@ class Grid:
         last = rows if last is None else last
         channels = image.shape[2]
         padded = np.zeros(((last - first) * STEP, columns * STEP, channels), image.dtype)
-        top, bottom = max(first * STEP - STEP // 2, 0), min(last * STEP - STEP // 2, self.height)
+        top = min(max(first * STEP - STEP // 2, 0), self.height)
+        bottom = min(last * STEP - STEP // 2, self.height)
         start = top - (first * STEP - STEP // 2)
         padded[start : start + bottom - top, STEP // 2 : STEP // 2 + self.width] = image[top:bottom]
         tiles = padded.reshape(last - first, STEP, columns, STEP, channels).transpose(0, 2, 4, 1, 3)

@@ -50,12 +50,13 @@ def test_mip_levels_average_the_image():
     assert np.abs(mip_levels(square)[-1] - square.mean(axis=(0, 1))).max() <= 1
 
 
-def test_raw_images_and_16_bits_are_stored_as_they_are():
+def test_raw_images_and_16_bits_lose_nothing():
     image = smooth_image(5, 7)
     data, on_card = raw_ktx2(image)
     assert on_card == image.nbytes and read_levels(data)[2] == [image.tobytes()]
     deep = (np.arange(48).reshape(6, 8, 1) * 1000).astype(np.uint16)
-    assert read_levels(texture_ktx2(deep, "bc7")[0])[2][0] == deep.tobytes()
+    stored = np.frombuffer(read_levels(texture_ktx2(deep, "bc7")[0])[2][0], "<f4")
+    assert (np.rint(stored * 65535).reshape(deep.shape) == deep).all()
 
 
 @pytest.mark.parametrize("kind", ["bc7", "astc"])
