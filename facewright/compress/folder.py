@@ -23,7 +23,7 @@ from facewright.write.files import file_name
 FORMAT = "facezip-1"
 INDEX = "facezip.json"
 LARGEST_SIDE = 16384
-# How hard PNG tries: 1 is a third of the time of 6 and 2 % larger on noise-like differences.
+# How hard PNG tries: 1 takes a quarter of the time of 6 and is 12 % larger (five images of 512 x 512).
 PNG_LEVEL = 1
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import struct
+import sys
 from dataclasses import replace
 from itertools import pairwise
 
@@ -28,6 +29,8 @@ def encoder_missing(kind):
     module, package = PACKAGES[kind]
     if importlib.util.find_spec(module):
         return ""
+    if kind == "bc7" and sys.platform == "darwin":
+        return "KTX2 is left out: bc7enc-py has no build for macOS; pip install 'facewright[ktx2]' and use --ktx2 astc"
     return f"KTX2 is left out: {kind.upper()} needs {package}; pip install 'facewright[ktx2]'"
 
 

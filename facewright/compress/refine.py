@@ -4,7 +4,7 @@ Minimises over D and w   sum over n of |X_n - sum_i D_i U(w_in)|^2 + ridge |D|^2
 upsampling of the GPU. With w held, D is a K x K system a texel; with D held, all N weight maps share one 9-point
 system of K x K blocks on the lattice of cells. One pass over the textures does the first exactly and gathers the
 second. Constant PCA weights are the start, hence a solution is never worse than PCA(K). The published start (masks,
-clusters, permutation) ends within 1 % of the same error and takes longer.
+clusters, permutation) ends no lower: 3.09 against 3.06 on 20 unrelated faces, 1.775 against 1.773 on a generated set.
 """
 
 from __future__ import annotations
