@@ -22,6 +22,7 @@ from facewright.write.files import file_name
 
 FORMAT = "facezip-1"
 INDEX = "facezip.json"
+HIDDEN = ".facezip-"
 LARGEST_SIDE = 16384
 # How hard PNG tries: 1 takes a quarter of the time of 6 and is 12 % larger (five images of 512 x 512).
 PNG_LEVEL = 1
@@ -163,6 +164,7 @@ class _Store:
 
 def cannot_write(folder, error):
     """The InputError of a folder that takes no more."""
+    folder = folder.parent if folder.name.startswith(HIDDEN) else folder
     return InputError(f"{folder}: cannot write ({error.strerror}); free space or choose another --out")
 
 
@@ -182,9 +184,9 @@ def publishing(out):
     """
     out = Path(out)
     try:
-        for left in out.glob(".facezip-*"):  # of a run that was killed
+        for left in out.glob(HIDDEN + "*"):  # of a run that was killed
             shutil.rmtree(left, ignore_errors=True)
-        workshop = Path(tempfile.mkdtemp(prefix=".facezip-", dir=out))
+        workshop = Path(tempfile.mkdtemp(prefix=HIDDEN, dir=out))
     except OSError as error:
         raise cannot_write(out, error) from error
     try:
