@@ -4,7 +4,8 @@
 
 PART  quality search seams examples time published large (default: all but large). Sets are the folders of
       ../shared/data/textures (neutral.png, mesh.obj, textures/) and generated ones. Time is of 20 generated textures,
-      from decoded images to PNG and JSON; cpu is what all cores spent, of which two would need half at best.
+      from decoded images to PNG and JSON; cpu is what all cores spent, quiet what two cores would need that do
+      nothing else: the main thread's seconds and half of the others'.
 large adds 2048 and 4096 with their memory, and 100 textures at 4096; each runs in a process of its own.
 """
 
@@ -197,19 +198,19 @@ def timing(sizes, verdict):
     rows = []
     for size in sizes:
         figures = in_process(size, 20)
-        row = [size, 20, *(figures[key] for key in ("wall", "cpu", "mb", "rmse")), PAPER_SECONDS.get(size)]
+        row = [size, 20, *(figures[key] for key in ("wall", "cpu", "quiet", "mb", "rmse")), PAPER_SECONDS.get(size)]
         rows.append([*row, figures["ktx2"], figures["preview"]])
         verdict.check(f"{size}, 20 textures", "seconds", figures["wall"], SECONDS[size])
         if size == 4096:
             verdict.check("4096, 20 textures", "GB", figures["mb"] / 1000, 12)
-    header = ["size", "textures", "wall s", "cpu s", "peak MB", "RMSE", "paper s", "ktx2 s", "preview s"]
+    header = ["size", "textures", "wall s", "cpu s", "quiet s", "peak MB", "RMSE", "paper s", "ktx2 s", "preview s"]
     print_table("Time", header, rows)
 
 
 def in_process(size, count):
     """Figures of one compression in a process of its own."""
     command = [sys.executable, __file__, "--one", str(size), str(count)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()[-1])
 
 
 def one(size, count):
@@ -231,14 +232,15 @@ def one(size, count):
         fetch = held.__getitem__
     del source.patterns
     names = [f"t{n}" for n in range(count)]
-    start, busy = time.perf_counter(), time.process_time()
+    start, busy, alone = time.perf_counter(), time.process_time(), time.thread_time()
     packed = facezip(neutral, fetch, names=names, covered=covered)
     with tempfile.TemporaryDirectory() as folder:
         write_packed(packed, folder)
         wall, cpu = time.perf_counter() - start, time.process_time() - busy
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        serial, peak = time.thread_time() - alone, own_peak_mb()
         seconds = packed.report["seconds"]
-        figures = {"wall": wall, "cpu": cpu, "mb": peak, "rmse": packed.report["mean_rmse"], **seconds}
+        quiet = serial + (cpu - serial) / 2
+        figures = {"wall": wall, "cpu": cpu, "quiet": quiet, "mb": peak, "rmse": packed.report["mean_rmse"], **seconds}
         figures["ktx2"] = figures["preview"] = None
         if count <= 20 and size <= 2048:
             from facewright.compress.preview import preview_page
@@ -251,6 +253,14 @@ def one(size, count):
             preview_page(packed, fetch, count)
             figures["preview"] = time.perf_counter() - start
     print(json.dumps(figures))
+
+
+def own_peak_mb():
+    """Peak resident memory of this process alone, MB; getrusage counts the parent's before exec too."""
+    status = Path("/proc/self/status")
+    if not status.is_file():
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    return next(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) / 1e3
 
 
 def published_procedure(sets, restarts, verdict):
@@ -366,7 +376,7 @@ def _crop(images, place, part):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("parts", nargs="*", choices=[*PARTS, "large", []], default=list(PARTS))
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join([*PARTS, "large"]))
     parser.add_argument("--set", type=Path, nargs="*", help="folders with neutral.png, mesh.obj and textures/")
     parser.add_argument("--sizes", type=int, nargs="*", default=[512, 1024])
     parser.add_argument("--restarts", type=int, default=1, help="of the published procedure; extrapolated to 100")
@@ -375,18 +385,22 @@ def main():
     if options.one:
         one(*options.one)
         return
+    parts = options.parts or PARTS
+    unknown = set(parts) - {*PARTS, "large"}
+    if unknown:
+        parser.error(f"no such part: {', '.join(sorted(unknown))}")
     folders = options.set if options.set is not None else sorted(TEXTURES.glob("*/")) if TEXTURES.is_dir() else []
     verdict = Verdict()
     sets = [(folder.name, read_set(folder), np.inf) for folder in folders] + list(generated_sets())
     run = {"quality": quality, "search": search, "seams": seams, "examples": examples}
-    for part in options.parts:
+    for part in parts:
         if part in run:
             run[part](sets, verdict)
-    if "published" in options.parts:
+    if "published" in parts:
         published_procedure(sets, options.restarts, verdict)
-    if "time" in options.parts:
+    if "time" in parts:
         timing(options.sizes, verdict)
-    if "large" in options.parts:
+    if "large" in parts:
         timing([2048, 4096], verdict)
         figures = in_process(4096, 100)
         print_table("100 textures at 4096", list(figures), [list(figures.values())])
