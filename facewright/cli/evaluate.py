@@ -4,6 +4,7 @@
   facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
   facewright evaluate rig result/                 # bars of the finished rig: lids and eyeballs
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+  facewright evaluate compression TEXTURES/ --neutral neutral.png --mesh neutral.obj --out figures/   # FaceZip
 
 Distances are in millimetres; docs/evaluate.md defines every figure.
 """
@@ -21,15 +22,28 @@ COLUMNS = ("mean", "rms", "p95", "max", "left_out")
 
 def add_arguments(parser):
     """Arguments of `facewright evaluate`."""
-    parser.add_argument("result", nargs="+", metavar="[rig] FOLDER", help="a folder that `facewright rig` wrote")
+    parser.add_argument(
+        "result",
+        nargs="+",
+        metavar="[rig|compression] FOLDER",
+        help="a folder that `facewright rig` wrote, or textures",
+    )
     parser.add_argument("--scan", metavar="FILE", help="the scan that the rig was made from")
     parser.add_argument("--shapes", action="store_true", help="measure every shape too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.add_argument("--neutral", metavar="IMAGE", help="compression: the neutral texture")
+    parser.add_argument("--mesh", metavar="OBJ", help="compression: the mesh with UVs that the textures belong to")
+    parser.add_argument("--out", metavar="FOLDER", help="compression: folder for tables, CSV and plots")
 
 
 def run(options):
     """Collect the figures and print them."""
     *what, folder = options.result
+    if what == ["compression"]:
+        from facewright.cli.evaluate_compression import evaluate
+
+        evaluate(folder, options)
+        return
     if what == ["rig"]:
         print_eyes(Path(folder), options.json)
         return
