@@ -8,7 +8,7 @@ from facewright.conventions import ARKIT_SHAPES, mirrored_name
 from hm08.carry import carry_nostrils
 from hm08.shapes.canvas import Canvas
 from hm08.shapes.eyes import just_closing
-from hm08.shapes.fair import Fairing, build_masks, falloff, symmetrised
+from hm08.shapes.fair import Fairing, Masks, falloff, symmetrised
 from hm08.shapes.jaw import closing
 from hm08.shapes.sketch import FLIP, Studio, left_half, read_sketches, symmetric_field
 
@@ -17,7 +17,7 @@ STILL_MM = (0.02, 0.10)  # motion below the first is none, above the second all
 
 def build_shapes(raw, control, head, regions, jaw):
     """(52, n, 3) deltas of the skin from raw (52, c_skin, 3) control deltas; jaw (R, t) its motion in jawOpen."""
-    masks, fair, nostrils = build_masks(head, regions), Fairing(head), carry_nostrils(control)
+    masks, fair, nostrils = Masks(head, regions), Fairing(head), carry_nostrils(control)
     places, folds, sketches = read_sketches()
     studio = Studio(Canvas(head, regions, places), folds)
     raw = dict(zip(ARKIT_SHAPES, symmetrised(raw, control.mirror[: control.n_skin])))

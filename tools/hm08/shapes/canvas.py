@@ -60,6 +60,10 @@ class Canvas:
         corners, shares = self.places[name]
         return shares @ self.V[corners]
 
+    def off_middle(self, name):
+        """Whether a place has a twin on the other side."""
+        return abs(self.place(name)[0]) > 1e-6
+
     def field(self, points, lips=(), held=(), reach_mm=45.0):
         """(n, 3) the field with the least bending through a sketch.
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from facewright.conventions import ARKIT_SHAPES, mirrored_name
 from facewright.mesh.laplacian import lumped_mass
@@ -13,24 +12,13 @@ from facewright.solve.quadratic import Factorization
 from hm08.regions import geodesic
 
 FAIR_MM = 5.0  # waves of a delta shorter than about this are taken for noise
-FAIR_NEAR_MM = 2.5  # the same at lids and seam, over so many times its length from them
+FAIR_NEAR_MM = 4.0  # the same at lids and seam; much less there would fold faces
+# Full up to the first distance from lids or seam, none from the second on.
 EYE_SUPPORT_MM = (30.0, 55.0)
-BROW_SUPPORT_MM = (60.0, 95.0)
-
-
-@dataclass(frozen=True)
-class Masks:
-    """(n,) weights in 0..1 of where each family of shapes may move the skin (left side for sided ones)."""
-
-    eye_left: np.ndarray
-    brow: np.ndarray
-    mouth: np.ndarray
-
-    def of(self, name):
-        """eye_left for lids, brow for brows, mouth for all the rest."""
-        if name.startswith("eye"):
-            return self.eye_left
-        return self.brow if name.startswith("brow") else self.mouth
+BROW_SUPPORT_MM = (50.0, 72.0)
+CHEEK_SUPPORT_MM = (52.0, 61.0)
+MOUTH_SUPPORT_MM = (66.0, 92.0)
+JAW_SUPPORT_MM = (100.0, 150.0)
 
 
 def symmetrised(raw, mirror):
@@ -48,20 +36,36 @@ def falloff(distance, support):
     return 1.0 - t * t * (3 - 2 * t)
 
 
-def build_masks(head, regions):
-    V, F = head.V, head.F
-    inside = regions["mouth_interior"]
-    sockets = regions["socket_left"] | regions["socket_right"]
-    skull = geodesic(V, F, np.flatnonzero(regions["skull"]))
-    off_skull = 1.0 - falloff(skull, (0.0, 25.0))
-    margin = np.concatenate([head.lines["lid_upper_left"], head.lines["lid_lower_left"]])
-    from_margin = geodesic(V, F, margin)
-    from_margins = np.minimum(from_margin, from_margin[head.mirror])
-    # Behind the margin the socket follows for a few millimetres, then it rests on the orbit.
-    socket = np.where(sockets, falloff(from_margins, (4.0, 14.0)), 1.0)
-    near_eye = falloff(from_margin, EYE_SUPPORT_MM) * ~regions["socket_right"] * ~inside * off_skull * socket
-    brow = falloff(from_margins, BROW_SUPPORT_MM) * ~inside * off_skull * socket
-    return Masks(near_eye, brow, off_skull * socket)
+class Masks:
+    """(n,) weights in 0..1 of where each family of shapes may move the skin."""
+
+    def __init__(self, head, regions):
+        V, F = head.V, head.F
+        inside = regions["mouth_interior"]
+        margin = np.concatenate([head.lines["lid_upper_left"], head.lines["lid_lower_left"]])
+        margins = np.concatenate([margin, head.mirror[margin]])
+        seam = np.concatenate([head.lines["lip_seam_upper"], head.lines["lip_seam_lower"]])
+        sockets = regions["socket_left"] | regions["socket_right"]
+        still = np.append(np.flatnonzero(regions["skull"]), head.lines["neck_ring"])
+        from_margin = geodesic(V, F, margin)
+        # Behind the margin the socket follows for a few millimetres, then it rests on the orbit.
+        socket = np.where(sockets, falloff(np.minimum(from_margin, from_margin[head.mirror]), (4.0, 14.0)), 1.0)
+        rest = (1.0 - falloff(geodesic(V, F, still), (0.0, 25.0))) * socket
+        from_lids, from_seam = (cKDTree(V[line]).query(V)[0] for line in (margins, seam))
+        below_eyes = falloff(V[:, 1], (V[margin, 1].min() - 6.0, V[margin, 1].max()))
+        self._families = {
+            "eye": falloff(from_margin, EYE_SUPPORT_MM) * ~regions["socket_right"] * ~inside * rest,
+            "brow": falloff(from_lids, BROW_SUPPORT_MM) * ~inside * rest,
+            "cheekS": falloff(np.minimum(from_lids, from_seam), CHEEK_SUPPORT_MM) * rest,
+            "mouth": falloff(from_seam, MOUTH_SUPPORT_MM) * below_eyes * rest,
+            "jaw": falloff(from_seam, JAW_SUPPORT_MM) * below_eyes * rest,
+        }
+        self._families |= {"nose": self._families["cheekS"], "cheekP": self._families["mouth"]}
+        self._families["tongue"] = self._families["jaw"]
+
+    def of(self, name):
+        """The mask of a shape; that of the eyes is for the left one."""
+        return next(mask for start, mask in self._families.items() if name.startswith(start))
 
 
 class Fairing:

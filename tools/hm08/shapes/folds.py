@@ -29,7 +29,7 @@ class Fold:
         beyond = np.where(np.isin(nearest, (0, len(share) - 1)), np.abs((offset * along).sum(axis=1)), 0.0)
         beyond /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)
         self.share, self.beyond = share[nearest], beyond
-        self.here = canvas.regions["outer"] & (V[:, 2] > samples[:, 2].min() - 25.0)
+        self.here = canvas.regions["outer"] & (V[:, 2] > samples[:, 2].min() - 60.0)  # not the back of the head
 
     def __call__(self, V, F, *, bulge_mm, bulge_width_mm, groove_mm, groove_width_mm, ends=(0.15, 0.15)):
         """(n, 3) displacement of a pose V (n, 3) along its normals; the bulge lies left of the line's direction.
@@ -39,7 +39,8 @@ class Fold:
         along = _smooth(self.share / max(ends[0], 1e-3)) * _smooth((1 - self.share) / max(ends[1], 1e-3))
         along = along * np.exp(-((self.beyond / 4.0) ** 2)) * self.here
         d = self.signed
-        bulge = bulge_mm * np.where(d > 0, (d / bulge_width_mm) * np.exp(1 - d / bulge_width_mm), 0.0)
+        away = np.maximum(d, 0.0) / bulge_width_mm
+        bulge = bulge_mm * away * np.exp(0.5 * (1.0 - away**2))
         center = -0.3 * groove_width_mm
         groove = -groove_mm * np.exp(-(((d - center) / groove_width_mm) ** 2))
         return vertex_normals(V, F) * (along * (bulge + groove))[:, None]

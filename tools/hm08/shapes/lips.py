@@ -11,6 +11,8 @@ from hm08.density import NEW_CORNER, SEAM_RING
 CORNER_COLUMN = round(4 * NEW_CORNER)
 SEAM_ROW = 4 * SEAM_RING
 LIP_ROWS = (-6, 12, 24)  # of the mouth's grid: the sections' weight rises, is full up to, and ends at these
+CORNER_SOFT = (0.7, 0.95)  # of the way to the corner: sections lose their hold on all but the seam
+PARTING = 0.85
 
 
 class LipSections:
@@ -29,7 +31,10 @@ class LipSections:
         start, full, end = LIP_ROWS
         inner = np.clip((self.row - start + 4) / 4, 0.0, 1.0)
         outer = np.clip((end - self.row) / (end - full), 0.0, 1.0)
-        return np.minimum(inner, outer) + 1e-4
+        # The corner is soft: there the rings run together, and both lips would pull at one place.
+        soft = np.clip((self.t - CORNER_SOFT[0]) / (CORNER_SOFT[1] - CORNER_SOFT[0]), 0.0, 1.0)
+        soft = np.where(self.row == SEAM_ROW, 1.0, 1.0 - soft * soft * (3 - 2 * soft))
+        return np.minimum(inner, outer) * soft + 1e-4
 
     def moved(self, V, upper, lower, turn_upper, turn_lower):
         """(k, 3) displacements: each section goes with its seam point and turns about it.
@@ -39,7 +44,12 @@ class LipSections:
         turn_*        (m,) degrees at such places, the same on both sides; positive rolls the lip outwards
         """
         out = np.zeros((len(self.vertices), 3))
-        for half, moves, turns, sign in ((self.upper, upper, turn_upper, -1), (~self.upper, lower, turn_lower, 1)):
+        both = [along_lip(*half, self.t) for half in (upper, lower)]
+        middle, apart = 0.5 * (both[0] + both[1]), 0.5 * (both[0] - both[1])
+        # Lips part softly from the corner, else the skin around it would fold.
+        near = np.clip((self.t - PARTING) / (1.0 - PARTING), 0.0, 1.0)[:, None]
+        apart = apart * (1.0 - near**2)
+        for half, turns, sign in ((self.upper, turn_upper, -1), (~self.upper, turn_lower, 1)):
             t = self.t[half]
             turns = np.atleast_1d(turns)[:, None]
             angle = sign * np.radians(along_lip(turns, turns, t)[:, 0])
@@ -49,7 +59,7 @@ class LipSections:
             along = (offset * axis).sum(axis=1, keepdims=True) * axis
             across = offset - along
             turned = along + c * across + s * np.cross(axis, across)
-            out[half] = along_lip(*moves, t) + turned - offset
+            out[half] = (middle - sign * apart)[half] + turned - offset
         return out
 
 
@@ -82,5 +92,8 @@ def lip_sections(head):
     tangent[[0, -1]] = [1.0, 0.0, 0.0]
     tangent = normalized(tangent)
     i = column // 2
-    t = 1.0 - np.abs(CORNER_COLUMN - column) / CORNER_COLUMN
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(seam, axis=0), axis=1)))
+    # By length: the columns crowd at the corner.
+    share = np.where(columns <= CORNER_COLUMN, steps / steps[half], (steps[-1] - steps) / (steps[-1] - steps[half]))
+    t = share[i]
     return LipSections(vertices, row, t, column > CORNER_COLUMN, seam[i], tangent[i])

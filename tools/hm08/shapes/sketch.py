@@ -37,7 +37,11 @@ class Studio:
         canvas = self.canvas
         points = [(name, 1, np.array(d)) for name, d in sketch["points"].items()]
         other = sketch.get("right", {})
-        points += [(name, -1, np.array(other[name]) if name in other else d * FLIP) for name, _, d in points]
+        points += [
+            (name, -1, np.array(other[name]) if name in other else d * FLIP)
+            for name, _, d in points
+            if canvas.off_middle(name)
+        ]
         held = canvas.lids if sketch.get("lids_stay", True) else ()
         field = canvas.field(points, self._lips(sketch), held, sketch.get("reach_mm", 45.0))
         for fold in sketch.get("folds", []):
