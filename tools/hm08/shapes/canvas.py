@@ -15,8 +15,7 @@ from facewright.solve.quadratic import Factorization
 from hm08.regions import geodesic
 from hm08.shapes.lips import lip_sections
 
-POINT_WEIGHT, LIP_WEIGHT, HELD_WEIGHT = 0.6, 0.25, 0.4
-DEEP_WEIGHT = 0.02
+POINT_WEIGHT, LID_WEIGHT, DEEP_WEIGHT = 0.6, 0.4, 0.02
 DEEP_MM = 14.0  # of the mouth's inside from the seam: rests on the bones
 SOCKET_MM = 5.0
 
@@ -33,11 +32,10 @@ class Canvas:
         n = len(self.V)
         self.mass = sp.diags(lumped_mass(self.V, self.F))
         margin = np.concatenate([head.lines["lid_upper_left"], head.lines["lid_lower_left"]])
-        self.lids = np.unique(np.concatenate([margin, self.mirror[margin]]))
         sockets = regions["socket_left"] | regions["socket_right"]
         seam = np.concatenate([head.lines["lip_seam_upper"], head.lines["lip_seam_lower"]])
         self.from_seam = geodesic(self.V, self.F, seam)
-        from_lids = geodesic(self.V, self.F, self.lids)
+        from_lids = geodesic(self.V, self.F, np.concatenate([margin, self.mirror[margin]]))
         ears = regions["ear_left"] | regions["ear_right"]
         self.still = regions["skull"] | ears | (sockets & (from_lids > SOCKET_MM))
         self.deep = regions["mouth_interior"] & (self.from_seam > DEEP_MM)
@@ -64,21 +62,34 @@ class Canvas:
         """Whether a place has a twin on the other side."""
         return abs(self.place(name)[0]) > 1e-6
 
-    def field(self, points, lips=(), held=(), reach_mm=45.0):
+    def lids(self, lower_deg):
+        """[(vertices, displacements, weights)] of the lid margins: still, but the lower turns up about the ball."""
+        upper, lower = self.head.lines["lid_upper_left"], self.head.lines["lid_lower_left"][1:-1]
+        offset = self.V[lower] - self.head.eye_center
+        share = np.linspace(0.0, np.pi, len(lower) + 2)[1:-1]
+        angle = -np.radians(lower_deg) * np.sin(share) ** 0.6
+        c, s = np.cos(angle), np.sin(angle)
+        y, z = offset[:, 1], offset[:, 2]
+        moves = np.stack([0 * y, c * y - s * z - y, s * y + c * z - z], axis=1)
+        sides = []
+        for vertices, move in ((upper, np.zeros((len(upper), 3))), (lower, moves)):
+            weights = np.full(len(vertices), LID_WEIGHT)
+            sides += [(vertices, move, weights), (self.mirror[vertices], move * [-1, 1, 1], weights)]
+        return sides
+
+    def field(self, points, lines=(), reach_mm=45.0):
         """(n, 3) the field with the least bending through a sketch.
 
         points    [(name, side, (3,) displacement)]; side 1 is the left, -1 the right one's mirrored place
-        lips      [(vertices (k,), displacements (k, 3), weights (k,))]
-        held      further vertices that stay
+        lines     [(vertices (k,), displacements (k, 3), weights (k,))]
         reach_mm  the field fades over about this distance from the last place
         """
         rows = [self._row(name, side) for name, side, _ in points]
         values = [np.reshape([d for *_, d in points], (-1, 3))]
         weights = [np.full(len(points), POINT_WEIGHT)]
-        still = [(np.asarray(held, int), HELD_WEIGHT), (np.flatnonzero(self.deep), DEEP_WEIGHT)]
-        groups = [(v, moves, LIP_WEIGHT * strength) for v, moves, strength in lips]
-        groups += [(v, np.zeros((len(v), 3)), np.full(len(v), weight)) for v, weight in still]
-        for vertices, moves, strength in groups:
+        deep = np.flatnonzero(self.deep)
+        rest = (deep, np.zeros((len(deep), 3)), np.full(len(deep), DEEP_WEIGHT))
+        for vertices, moves, strength in [*lines, rest]:
             k = len(vertices)
             rows.append(sp.csr_matrix((np.ones(k), (np.arange(k), vertices)), shape=(k, self.n)))
             values.append(moves)

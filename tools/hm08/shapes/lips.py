@@ -13,6 +13,7 @@ SEAM_ROW = 4 * SEAM_RING
 LIP_ROWS = (-6, 12, 24)  # of the mouth's grid: the sections' weight rises, is full up to, and ends at these
 CORNER_SOFT = (0.7, 0.95)  # of the way to the corner: sections lose their hold on all but the seam
 PARTING = 0.85
+LIP_WEIGHT = 0.25
 
 
 class LipSections:
@@ -34,7 +35,7 @@ class LipSections:
         # The corner is soft: there the rings run together, and both lips would pull at one place.
         soft = np.clip((self.t - CORNER_SOFT[0]) / (CORNER_SOFT[1] - CORNER_SOFT[0]), 0.0, 1.0)
         soft = np.where(self.row == SEAM_ROW, 1.0, 1.0 - soft * soft * (3 - 2 * soft))
-        return np.minimum(inner, outer) * soft + 1e-4
+        return LIP_WEIGHT * (np.minimum(inner, outer) * soft + 1e-4)
 
     def moved(self, V, upper, lower, turn_upper, turn_lower):
         """(k, 3) displacements: each section goes with its seam point and turns about it.

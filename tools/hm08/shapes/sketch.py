@@ -42,8 +42,8 @@ class Studio:
             for name, _, d in points
             if canvas.off_middle(name)
         ]
-        held = canvas.lids if sketch.get("lids_stay", True) else ()
-        field = canvas.field(points, self._lips(sketch), held, sketch.get("reach_mm", 45.0))
+        lines = self._lips(sketch) + canvas.lids(sketch.get("lower_lid_deg", 0.0))
+        field = canvas.field(points, lines, sketch.get("reach_mm", 45.0))
         for fold in sketch.get("folds", []):
             values = {key: value for key, value in fold.items() if key != "line"}
             left = self.folds[fold["line"]](canvas.V + field, canvas.F, **values)
