@@ -12,7 +12,7 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
-from facewright.contact import EyeShapes, solve_eyes
+from facewright.contact import Targets, part_lips, solve_eyes, solve_mouth
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
 from facewright.output import OutputFolder
@@ -224,7 +224,7 @@ def _register(run, scan, landmarks, placed, template, folder, options):
 
 def _parts(run, face, template):
     def work():
-        return pack_face(fit_parts(face))
+        return pack_face(part_lips(fit_parts(face)))
 
     arrays, info = run.stage("04-parts", work)
     return unpack_face(arrays, info, template)
@@ -232,15 +232,16 @@ def _parts(run, face, template):
 
 def _transfer(run, face, template):
     def work():
-        eyes = solve_eyes(face, transfer_shapes(face))
-        info = {"names": list(template.shape_names), "extras": list(eyes.extras)}
+        targets = solve_mouth(face, solve_eyes(face, transfer_shapes(face)))
+        info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
-        info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in eyes.in_betweens.items()]
-        info["correctives"] = [[name, list(drivers)] for name, drivers in eyes.correctives.items()]
-        return {"deltas": eyes.deltas, "extras": np.array(list(eyes.extras.values()))}, info
+        info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in targets.in_betweens.items()]
+        info["correctives"] = [[name, list(drivers)] for name, drivers in targets.correctives.items()]
+        return {"deltas": targets.deltas, "extras": np.array(list(targets.extras.values()))}, info
 
     arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
-    return EyeShapes(
+    return Targets(
+        tuple(info["names"]),
         arrays["deltas"],
         dict(zip(info["extras"], arrays["extras"])),
         {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"]},

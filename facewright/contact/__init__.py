@@ -1,5 +1,7 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
-from facewright.contact.eyes import EyeShapeOptions, EyeShapes, solve_eyes
+from facewright.contact.eyes import EyeShapeOptions, solve_eyes
+from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
+from facewright.contact.targets import Targets
 
-__all__ = ["EyeShapeOptions", "EyeShapes", "solve_eyes"]
+__all__ = ["EyeShapeOptions", "MouthOptions", "Targets", "part_lips", "solve_eyes", "solve_mouth"]

@@ -1,0 +1,153 @@
+"""Lips that neither pass through each other nor into the teeth, along the whole path of a shape.
+
+Contact is asked twice: a vertex of one lip is in the other if it lies behind the nearest point of that lip and if the
+winding number of the skin says that it is in flesh (the first alone finds false depths of many millimetres on open
+mouths). Both lips then give way half and half, and the skin around follows smoothly: a soft biharmonic field whose
+wishes add up over a few rounds and over all weights at once, so that one delta serves the whole way from 0 to 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.contact.teeth import Teeth
+from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.normals import vertex_normals
+from facewright.mesh.seam import seam_sides
+from facewright.mesh.spread import SoftSpread
+
+_ASIDE_MM = 0.02  # a vertex is asked about this far in front of its own surface, so that this does not count
+_MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
+_PIN = 100.0  # weight of a push against 1 mm2 of bending
+_NOTHING_MM = 1e-4
+
+
+@dataclass(frozen=True)
+class LipOptions:
+    """lip_mm   along the skin from the seam, outwards and inwards: what counts as lip
+    near_mm  skin this far from the seam may give way, and says where flesh is
+    smooth_mm width over which a push is felt
+    gap_mm   between lips that have been pushed apart
+    touch_mm contact less deep than this is none
+    teeth_mm how deep in a tooth skin may stay that is there at rest
+    weights  of a shape at which its contact is solved
+    rounds   of pushing, at most
+    """
+
+    lip_mm: float = 12.0
+    near_mm: float = 25.0
+    smooth_mm: float = 0.8
+    reach_mm: float = 4.0
+    touch_mm: float = 0.05
+    gap_mm: float = 0.03
+    teeth_mm: float = 0.1
+    weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
+    rounds: int = 8
+
+
+class LipContact:
+    """The lips of one head, asked for contact in any pose of it.
+
+    vertices (n, 3) mm the neutral of the whole head; faces (m, 3) of its skin, the same on both sides (even_handed)
+    seams    upper and lower line, paired, with shared ends
+    teeth    sequence of slices of the rows of teeth among the vertices, with their faces (from 0): (slice, faces)
+    """
+
+    def __init__(self, vertices, faces, seams, teeth=(), options=None):
+        self.options = options or LipOptions()
+        self.V = vertices
+        seam = np.unique(np.concatenate(seams))
+        near = cKDTree(vertices[seam]).query(vertices)[0] < self.options.near_mm
+        around = faces[near[faces].all(axis=1)]
+        sides = seam_sides(vertices, around, *seams, self.options.lip_mm, split_ends=False)
+        self.used, local = np.unique(around, return_inverse=True)
+        self.faces = np.ascontiguousarray(local.reshape(-1, 3))
+        self.sides = [np.flatnonzero(side[self.used]) for side in sides]
+        self.patches = [self.faces[side[self.used][self.faces].all(axis=1)] for side in sides]
+        self.rims = [border_vertices(patch, len(self.used)) for patch in self.patches]
+        self.lips = self.used[np.concatenate(self.sides)]
+        rest = np.ascontiguousarray(vertices[self.used])
+        free = ~border_vertices(self.faces, len(rest))
+        self.spread = SoftSpread(
+            rest, self.faces, free, smooth_mm=self.options.smooth_mm, reach_mm=self.options.reach_mm
+        )
+        # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
+        asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
+        self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
+        self.teeth = [(at, Teeth(vertices[at], own)) for at, own in teeth]
+        in_teeth = [np.linalg.norm(row.way_out(rest, vertices[at]), axis=1) for at, row in self.teeth]
+        self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
+
+    def apart(self, motion, weights=None, power=1):
+        """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
+
+        motion   function of a weight: displacement (n, 3) of the head from the neutral; a correction c acts on it as
+                 weight**power * c
+        weights  at which contact is solved; default: options.weights
+        """
+        field = np.zeros((len(self.used), 3))
+        hold = np.zeros(len(self.used))
+        poses = [(weight, self.V + motion(weight)) for weight in weights or self.options.weights]
+        for _ in range(self.options.rounds):
+            total, most = np.zeros_like(field), np.zeros(len(field))
+            for weight, pose in poses:
+                share = weight**power
+                wishes, heeded = self._wishes(pose[self.used] + share * field, pose)
+                size = np.linalg.norm(wishes, axis=1) / share
+                more = size > most
+                total[more], most[more] = wishes[more] / share, size[more]
+                hold = np.maximum(hold, heeded)
+            if not most.any():
+                break
+            field = self.spread(field + total, _PIN * hold)
+        result = np.zeros_like(self.V)
+        result[self.used] = field
+        result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
+        return result
+
+    def _wishes(self, skin, pose):
+        """Wishes (k, 3) that undo the contact of the skin around the lips (k, 3), teeth in a pose (n, 3) of the head,
+        and (k,) in 0..1 who wishes."""
+        skin = np.ascontiguousarray(skin)
+        wishes, counts = self._lip_wishes(skin)
+        for (at, row), allowed in zip(self.teeth, self._in_teeth):
+            way = row.way_out(skin, pose[at])
+            depth = np.linalg.norm(way, axis=1)
+            hit = depth > allowed + self.options.touch_mm
+            wishes[hit] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            counts[hit] = 1.0
+        return wishes, np.minimum(counts, 1.0)
+
+    def _lip_wishes(self, skin):
+        normals = vertex_normals(skin, self.faces)
+        wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
+        for mine, patch, rim in zip(self.sides, self.patches[::-1], self.rims[::-1]):
+            found = Surface(skin, patch).closest(skin[mine])
+            corners = patch[found.faces]
+            normal = interpolate(normals, patch, found.faces, found.barycentric)
+            way = found.points - skin[mine]
+            maybe = ((way * normal).sum(axis=1) > self.options.touch_mm) & (found.distance < _MOST_MM)
+            maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
+            at = np.flatnonzero(maybe)
+            if not len(at):
+                continue
+            asked = skin[mine[at]] + _ASIDE_MM * normals[mine[at]]
+            at = at[_winding(skin, self.faces, asked) + self._beyond[mine[at]] > 0.5]
+            push = 0.5 * (way[at] + self.options.gap_mm * normal[at])
+            np.add.at(wishes, mine[at], push)
+            np.add.at(counts, mine[at], 1.0)
+            for corner in range(3):
+                share = found.barycentric[at, corner]
+                np.add.at(wishes, corners[at, corner], -share[:, None] * push)
+                np.add.at(counts, corners[at, corner], share)
+        return wishes / np.maximum(counts, 1.0)[:, None], counts
+
+
+def _winding(vertices, faces, points):
+    arrays = (np.ascontiguousarray(a) for a in (vertices, faces, points))
+    return np.asarray(igl.fast_winding_number(*arrays)).reshape(-1)
