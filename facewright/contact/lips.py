@@ -31,23 +31,21 @@ _NOTHING_MM = 1e-4
 class LipOptions:
     """lip_mm   along the skin from the seam, outwards and inwards: what counts as lip
     near_mm  skin this far from the seam may give way, and says where flesh is
-    smooth_mm width over which a push is felt
+    smooth_mm width over which a push is felt, round by round: deep contact moves a lip as a whole, the rest is local
     gap_mm   between lips that have been pushed apart
     touch_mm contact less deep than this is none
     teeth_mm how deep in a tooth skin may stay that is there at rest
     weights  of a shape at which its contact is solved
-    rounds   of pushing, at most
     """
 
     lip_mm: float = 12.0
-    near_mm: float = 25.0
-    smooth_mm: float = 0.8
+    near_mm: float = 20.0
+    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8)
     reach_mm: float = 4.0
-    touch_mm: float = 0.05
-    gap_mm: float = 0.03
+    touch_mm: float = 0.12
+    gap_mm: float = 0.05
     teeth_mm: float = 0.1
     weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
-    rounds: int = 8
 
 
 class LipContact:
@@ -70,17 +68,16 @@ class LipContact:
         self.sides = [np.flatnonzero(side[self.used]) for side in sides]
         self.patches = [self.faces[side[self.used][self.faces].all(axis=1)] for side in sides]
         self.rims = [border_vertices(patch, len(self.used)) for patch in self.patches]
-        self.lips = self.used[np.concatenate(self.sides)]
+        self._both = np.concatenate(self.sides)
+        self.lips = self.used[self._both]
         rest = np.ascontiguousarray(vertices[self.used])
         free = ~border_vertices(self.faces, len(rest))
-        self.spread = SoftSpread(
-            rest, self.faces, free, smooth_mm=self.options.smooth_mm, reach_mm=self.options.reach_mm
-        )
+        self.spread = SoftSpread(rest, self.faces, free, self.options.reach_mm)
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
         self.teeth = [(at, Teeth(vertices[at], own)) for at, own in teeth]
-        in_teeth = [np.linalg.norm(row.way_out(rest, vertices[at]), axis=1) for at, row in self.teeth]
+        in_teeth = [np.linalg.norm(row.way_out(rest[self._both], vertices[at]), axis=1) for at, row in self.teeth]
         self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
 
     def apart(self, motion, weights=None, power=1):
@@ -92,19 +89,25 @@ class LipContact:
         """
         field = np.zeros((len(self.used), 3))
         hold = np.zeros(len(self.used))
-        poses = [(weight, self.V + motion(weight)) for weight in weights or self.options.weights]
-        for _ in range(self.options.rounds):
-            total, most = np.zeros_like(field), np.zeros(len(field))
-            for weight, pose in poses:
+        poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
+        asked = list(poses)
+        for smooth_mm in self.options.smooth_mm:
+            total, most, met = np.zeros_like(field), np.zeros(len(field)), []
+            for weight in asked:
                 share = weight**power
-                wishes, heeded = self._wishes(pose[self.used] + share * field, pose)
+                wishes, heeded = self._wishes(poses[weight][self.used] + share * field, poses[weight])
                 size = np.linalg.norm(wishes, axis=1) / share
                 more = size > most
                 total[more], most[more] = wishes[more] / share, size[more]
                 hold = np.maximum(hold, heeded)
-            if not most.any():
+                if more.any():
+                    met.append(weight)
+            if met:
+                field = self.spread(field + total, _PIN * hold, smooth_mm)
+            elif len(asked) == len(poses):
                 break
-            field = self.spread(field + total, _PIN * hold)
+            # What was free stays unasked until the rest is free: most of a path never touches.
+            asked = met or list(poses)
         result = np.zeros_like(self.V)
         result[self.used] = field
         result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
@@ -116,36 +119,43 @@ class LipContact:
         skin = np.ascontiguousarray(skin)
         wishes, counts = self._lip_wishes(skin)
         for (at, row), allowed in zip(self.teeth, self._in_teeth):
-            way = row.way_out(skin, pose[at])
+            way = row.way_out(skin[self._both], pose[at])
             depth = np.linalg.norm(way, axis=1)
             hit = depth > allowed + self.options.touch_mm
-            wishes[hit] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
-            counts[hit] = 1.0
+            wishes[self._both[hit]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            counts[self._both[hit]] = 1.0
         return wishes, np.minimum(counts, 1.0)
 
     def _lip_wishes(self, skin):
+        """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
         normals = vertex_normals(skin, self.faces)
+        suspects = [self._suspects(skin, normals, side) for side in (0, 1)]
+        index, corners, share, way = (np.concatenate(both) for both in zip(*suspects))
         wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
-        for mine, patch, rim in zip(self.sides, self.patches[::-1], self.rims[::-1]):
-            found = Surface(skin, patch).closest(skin[mine])
-            corners = patch[found.faces]
-            normal = interpolate(normals, patch, found.faces, found.barycentric)
-            way = found.points - skin[mine]
-            maybe = ((way * normal).sum(axis=1) > self.options.touch_mm) & (found.distance < _MOST_MM)
-            maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
-            at = np.flatnonzero(maybe)
-            if not len(at):
-                continue
-            asked = skin[mine[at]] + _ASIDE_MM * normals[mine[at]]
-            at = at[_winding(skin, self.faces, asked) + self._beyond[mine[at]] > 0.5]
-            push = 0.5 * (way[at] + self.options.gap_mm * normal[at])
-            np.add.at(wishes, mine[at], push)
-            np.add.at(counts, mine[at], 1.0)
-            for corner in range(3):
-                share = found.barycentric[at, corner]
-                np.add.at(wishes, corners[at, corner], -share[:, None] * push)
-                np.add.at(counts, corners[at, corner], share)
+        if not len(index):
+            return wishes, counts
+        asked = skin[index] + _ASIDE_MM * normals[index]
+        inside = _winding(skin, self.faces, asked) + self._beyond[index] > 0.5
+        index, corners, share, way = (values[inside] for values in (index, corners, share, way))
+        at = np.concatenate([index[:, None], corners], axis=1).ravel()
+        weight = np.concatenate([np.ones((len(index), 1)), share], axis=1).ravel()
+        push = np.repeat(0.5 * way, 4, axis=0) * weight[:, None]
+        push.reshape(-1, 4, 3)[:, 1:] *= -1
+        np.add.at(wishes, at, push)
+        np.add.at(counts, at, weight)
         return wishes / np.maximum(counts, 1.0)[:, None], counts
+
+    def _suspects(self, skin, normals, side):
+        """Vertices (k,) of a lip that lie behind the other one's surface: with the corners (k, 3) of the triangle they
+        have passed, their shares of it (k, 3) and the way out (k, 3)."""
+        mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
+        found = Surface(skin, patch).closest(skin[mine])
+        corners = patch[found.faces]
+        normal = interpolate(normals, patch, found.faces, found.barycentric)
+        way = found.points - skin[mine]
+        maybe = ((way * normal).sum(axis=1) > self.options.touch_mm) & (found.distance < _MOST_MM)
+        maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
+        return mine[maybe], corners[maybe], found.barycentric[maybe], (way + self.options.gap_mm * normal)[maybe]
 
 
 def _winding(vertices, faces, points):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import igl
 import numpy as np
+from scipy.spatial import cKDTree
 
 from facewright.evaluate.quality import lip_gaps_mm
 from facewright.expand import expand_weights
@@ -15,7 +16,7 @@ from facewright.mesh.seam import seam_sides
 WEIGHTS = (0.25, 0.5, 0.75, 1.0)
 CROSSING_BAR_MM, TEETH_BAR_MM, CLOSE_BAR_MM = 0.3, 0.3, 0.5
 LIP_REACH_MM = 12.0  # along the skin from the seam, outwards and inwards: what counts as lip
-TEETH_REACH_MM = 20.0  # skin that could come to lie in the teeth
+FACE_MM = 45.0  # from the seam: skin that teeth could stand out of
 MOST_MM = 8.0  # nothing crosses deeper: what seems to has met the other lip from behind
 MOVES_MM = 0.02
 _OFF_MM = 0.02  # a vertex is asked about this far in front of its own surface, so that this does not count
@@ -71,7 +72,7 @@ def measure_mouth(rig, poses=None):
 
     poses name -> {"crossing_mm", "teeth_mm", "through_mm"}, each a pair (with in-betweens and correctives, plain 52):
     crossing_mm  depth of the deepest vertex of a lip inside the other lip
-    teeth_mm     depth of the deepest vertex of lips or mouth bag inside the teeth
+    teeth_mm     depth of the deepest vertex of a lip inside the teeth
     through_mm   how far a tooth stands out of the outer skin, beyond the red of the lips
     mouth_close_gap_mm  largest distance of paired seam points at jawOpen 1 + mouthClose 1 (a pair as above)
     """
@@ -108,9 +109,10 @@ class _Mouth:
         seams = rig.lines["lip_seam_upper"], rig.lines["lip_seam_lower"]
         self.sides = seam_sides(V, F, *seams, LIP_REACH_MM, split_ends=False)
         self.patches = [F[side[F].all(axis=1)] for side in self.sides]
-        away = Surface(V, np.concatenate(self.patches)).closest(V).distance
         self.rims = [border_vertices(patch, len(V)) for patch in self.patches]
-        self.near = np.flatnonzero(away < TEETH_REACH_MM - LIP_REACH_MM)
+        self.lips = np.flatnonzero(self.sides[0] | self.sides[1])
+        near = cKDTree(V[np.concatenate(seams)]).query(V)[0] < FACE_MM
+        self.around = F[near[F].all(axis=1)]
         self.teeth = [mesh for mesh in rig.meshes if mesh.name.startswith("teeth")]
         self.beyond = rig.regions["outer"] & ~rig.regions["lip_upper"] & ~rig.regions["lip_lower"]
 
@@ -150,10 +152,10 @@ class _Mouth:
         return float(deepest)
 
     def in_teeth(self, skin, teeth):
-        """Depth in mm of the deepest vertex of lips or bag inside the teeth [(vertices, faces)]."""
+        """Depth in mm of the deepest vertex of a lip inside the teeth [(vertices, faces)]."""
         deepest = 0.0
         for vertices, faces in teeth:
-            points = skin[self.near]
+            points = skin[self.lips]
             low, high = vertices.min(axis=0), vertices.max(axis=0)
             points = points[((points > low) & (points < high)).all(axis=1)]
             points = points[_inside(vertices, faces, points)]
@@ -164,12 +166,12 @@ class _Mouth:
     def through(self, skin, teeth):
         """How far in mm teeth stand out of the skin of a pose, beyond the red of the lips."""
         farthest = 0.0
-        surface, normals = Surface(skin, self.skin.faces), vertex_normals(skin, self.skin.faces)
+        surface, normals = Surface(skin, self.around), vertex_normals(skin, self.skin.faces)
         for vertices, _ in teeth:
             found = surface.closest(vertices)
-            normal = interpolate(normals, self.skin.faces, found.faces, found.barycentric)
+            normal = interpolate(normals, self.around, found.faces, found.barycentric)
             out = ((vertices - found.points) * normal).sum(axis=1) > 0
-            out &= self.beyond[self.skin.faces[found.faces]].all(axis=1)
+            out &= self.beyond[self.around[found.faces]].all(axis=1)
             farthest = max(farthest, found.distance[out].max(initial=0.0))
         return float(farthest)
 
