@@ -25,6 +25,7 @@ _ASIDE_MM = 0.02  # a vertex is asked about this far in front of its own surface
 _MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
 _PIN = 100.0  # weight of a push against 1 mm2 of bending
 _NOTHING_MM = 1e-4
+_LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class LipOptions:
 
     lip_mm: float = 12.0
     near_mm: float = 20.0
-    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8)
+    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8, 0.8, 0.8)
     reach_mm: float = 4.0
     touch_mm: float = 0.12
     gap_mm: float = 0.05
@@ -68,6 +69,9 @@ class LipContact:
         self.sides = [np.flatnonzero(side[self.used]) for side in sides]
         self.patches = [self.faces[side[self.used][self.faces].all(axis=1)] for side in sides]
         self.rims = [border_vertices(patch, len(self.used)) for patch in self.patches]
+        place = np.full(len(vertices), -1)
+        place[self.used] = np.arange(len(self.used))
+        self._pairs = [place[line[1:-1]] for line in seams]
         self._both = np.concatenate(self.sides)
         self.lips = self.used[self._both]
         rest = np.ascontiguousarray(vertices[self.used])
@@ -80,22 +84,26 @@ class LipContact:
         in_teeth = [np.linalg.norm(row.way_out(rest[self._both], vertices[at]), axis=1) for at, row in self.teeth]
         self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
 
-    def apart(self, motion, weights=None, power=1):
+    def apart(self, motion, weights=None, power=1, closed=False):
         """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
 
         motion   function of a weight: displacement (n, 3) of the head from the neutral; a correction c acts on it as
                  weight**power * c
         weights  at which contact is solved; default: options.weights
+        closed   the lips shall meet: pairs of the seam stay together while the rest moves apart, locally
         """
         field = np.zeros((len(self.used), 3))
         hold = np.zeros(len(self.used))
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
         asked = list(poses)
-        for smooth_mm in self.options.smooth_mm:
+        for width in _LOCAL_MM if closed else self.options.smooth_mm:
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
             for weight in asked:
                 share = weight**power
-                wishes, heeded = self._wishes(poses[weight][self.used] + share * field, poses[weight])
+                skin = poses[weight][self.used] + share * field
+                wishes, heeded = self._wishes(skin, poses[weight])
+                if closed:
+                    self._add_closing(skin, wishes, heeded)
                 size = np.linalg.norm(wishes, axis=1) / share
                 more = size > most
                 total[more], most[more] = wishes[more] / share, size[more]
@@ -103,7 +111,7 @@ class LipContact:
                 if more.any():
                     met.append(weight)
             if met:
-                field = self.spread(field + total, _PIN * hold, smooth_mm)
+                field = self.spread(field + total, _PIN * hold, width)
             elif len(asked) == len(poses):
                 break
             # What was free stays unasked until the rest is free: most of a path never touches.
@@ -125,6 +133,16 @@ class LipContact:
             wishes[self._both[hit]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
             counts[self._both[hit]] = 1.0
         return wishes, np.minimum(counts, 1.0)
+
+    def _add_closing(self, skin, wishes, counts):
+        """Add, in place, what brings pairs of the seam that have come apart back to a small gap, half and half."""
+        a, b = self._pairs
+        way = skin[b] - skin[a]
+        apart = np.linalg.norm(way, axis=1)
+        far = apart > self.options.touch_mm
+        push = 0.5 * way[far] * (1 - self.options.gap_mm / apart[far])[:, None]
+        wishes[a[far]], wishes[b[far]] = push, -push
+        counts[a[far]] = counts[b[far]] = 1.0
 
     def _lip_wishes(self, skin):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""

@@ -10,6 +10,7 @@ from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
 from facewright.conventions import corrective_name, in_between_name, mirrored_name
+from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_handed
 
 HALF = 0.5
@@ -41,7 +42,7 @@ def part_lips(face, options=None):
     """The Face with a neutral whose lips neither cross nor stand in the teeth (its parts are in place)."""
     contact = _Mouth(face, options or MouthOptions()).contact
     still = np.zeros_like(face.vertices)
-    return replace(face, vertices=face.vertices + contact.apart(lambda weight: still, (1.0,), power=0))
+    return replace(face, vertices=face.vertices + contact.apart(lambda weight: still, (1.0,), power=0, closed=True))
 
 
 def solve_mouth(face, targets, options=None):
@@ -69,6 +70,9 @@ class _Mouth:
         rows = [part for part in template.parts if part.name.startswith("teeth")]
         teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]
         self.contact = LipContact(face.vertices, self.faces, self.seams, teeth, options.lips)
+        skull = face.regions["skull"]
+        still = skull if skull.any() else face.regions["outer"]
+        self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
         share = np.clip(0.5 + template.vertices[:, 0] / options.window_mm, 0.0, 1.0)
         self.left = (share * share * (3 - 2 * share))[:, None]
 
@@ -110,7 +114,9 @@ class _Mouth:
         for weight, target in targets.in_betweens.get("jawOpen", {}).items():
             opens[weight] = targets.delta(target)[self.skin]
         skin = self.face.vertices[self.skin]
-        closed = dict(zip(opens, mouth_close(skin, self.faces, self.seams, jaw, opens, self.options.close)))
+        closed = dict(
+            zip(opens, mouth_close(skin, self.faces, self.seams, jaw, opens, self.forward, self.options.close))
+        )
         deltas = np.array(targets.deltas)
         k = targets.names.index("mouthClose")
         deltas[k] = 0.0
@@ -122,7 +128,7 @@ class _Mouth:
             extras[steps[weight]][self.skin] = delta
         in_betweens = targets.in_betweens | ({"mouthClose": steps} if steps else {})
         made = replace(targets, deltas=deltas, extras=extras, in_betweens=in_betweens)
-        return self._corrected(made, {"jawOpen": 1.0, "mouthClose": 1.0}, {"mouthClose": 1.0})
+        return self._corrected(made, {"jawOpen": 1.0, "mouthClose": 1.0}, {"mouthClose": 1.0}, closed=True)
 
     def with_pairs(self, targets):
         """Targets with a corrective for each pair of options.pairs that the template has."""
@@ -132,7 +138,7 @@ class _Mouth:
             if not all(sides):
                 continue
             together = {name: 1.0 for side in sides for name in side}
-            lack = self._lack(targets, together, (1.0, HALF), power=2)
+            lack = self._lack(targets, together, weights=(1.0, HALF), power=2)
             for drivers, share in self._shared(sides):
                 name = corrective_name(drivers)
                 extras[name], correctives[name] = share * lack, drivers
@@ -151,13 +157,13 @@ class _Mouth:
         motion = np.abs(targets.deltas[:, self.contact.lips]).max(axis=(1, 2))
         return [name for name, most in zip(targets.names, motion) if most > _MOVES_MM and name != "mouthClose"]
 
-    def _lack(self, targets, pose, weights=None, power=1):
-        """(n, 3) what a pose lacks along its way."""
-        return self.contact.apart(lambda weight: targets.motion(_scaled(pose, weight)), weights, power)
+    def _lack(self, targets, pose, **how):
+        """(n, 3) what a pose lacks along its way; how: as LipContact.apart takes it."""
+        return self.contact.apart(lambda weight: targets.motion(_scaled(pose, weight)), **how)
 
-    def _corrected(self, targets, pose, shares):
+    def _corrected(self, targets, pose, shares, closed=False):
         """Targets after the contact of a pose has been solved along its way; shares: name -> its part of the result."""
-        field = self._lack(targets, pose)
+        field = self._lack(targets, pose, closed=closed)
         if not field.any():
             return targets
         deltas, extras = np.array(targets.deltas), dict(targets.extras)

@@ -23,12 +23,14 @@ class MouthCloseOptions:
     share: float = 0.25
 
 
-def mouth_close(vertices, faces, seams, jaw, opens, options=None):
+def mouth_close(vertices, faces, seams, jaw, opens, forward, options=None):
     """Deltas (k, n, 3) of mouthClose for jaws opened by shares of their way: opens dict share -> (n, 3) of jawOpen.
 
     With jawOpen the lips are a rigid copy of the neutral's, turned about the hinge by a part of the jaw's turn, so they
-    touch as the neutral's do and their corners cannot pinch; the skin between follows biharmonically.
+    touch as the neutral's do and their corners cannot pinch; the skin between follows biharmonically. The upper teeth
+    stay: what the turn would take the lips back into them is given back.
     vertices (n, 3) the neutral skin, faces (m, 3), seams the upper and lower line, jaw a jaw.Jaw
+    forward  (3,) unit, where the face looks
     """
     options = options or MouthCloseOptions()
     sides = seam_sides(vertices, faces, *seams, options.zone_mm)
@@ -37,9 +39,10 @@ def mouth_close(vertices, faces, seams, jaw, opens, options=None):
     zone[seam] = True
     away = cKDTree(vertices[seam]).query(vertices)[0]
     handles = np.flatnonzero(zone)
-    values = [
-        jaw.moved(vertices[handles], options.share * share) - vertices[handles] - opened[handles]
-        for share, opened in opens.items()
-    ]
+    values = []
+    for share, opened in opens.items():
+        moved = jaw.moved(vertices[handles], options.share * share) - vertices[handles]
+        back = min(0.0, (jaw.moved(vertices[seam], options.share * share) - vertices[seam]).mean(axis=0) @ forward)
+        values.append(moved - back * forward - opened[handles])
     field = spread_smoothly(vertices, faces, handles, np.concatenate(values, axis=1), away < options.reach_mm)
     return np.stack(np.split(field, len(opens), axis=1))
