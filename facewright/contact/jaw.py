@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -29,6 +29,14 @@ class Jaw:
         """(n, 3) the in-between of jawOpen (n, 3): on the arc where the bone leads, on the chord for what is added."""
         by_bone = [self.weights[:, None] * (self.moved(vertices, share) - vertices) for share in (half, 1.0)]
         return by_bone[0] + half * (jaw_open - by_bone[1])
+
+    def on_rig(self, rig):
+        """The Rig with its jaw bone at the hinge; info["jaw_open_turn_deg"]: the bone's turn that matches jawOpen."""
+        skeleton = rig.skeleton
+        positions = np.array(skeleton.positions)
+        positions[skeleton.names.index("jaw")] = self.hinge
+        turn = {"jaw_open_turn_deg": np.degrees(self.turn).tolist()}
+        return replace(rig, skeleton=replace(skeleton, positions=positions), info=rig.info | turn)
 
 
 def find_jaw(face, jaw_open):

@@ -11,10 +11,11 @@ from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
 from facewright.conventions import corrective_name, in_between_name, mirrored_name
 from facewright.solve.procrustes import best_rotation
-from facewright.transfer.shapes import even_handed
+from facewright.transfer.shapes import even_cut
 
 HALF = 0.5
 _MOVES_MM = 0.02
+_EVEN_MM = 1e-6
 PAIRS = (
     ("mouthSmile", "jawOpen"),
     ("mouthSmile", "mouthFunnel"),
@@ -55,7 +56,14 @@ def solve_mouth(face, targets, options=None):
     result = mouth.with_single_shapes(result)
     result = mouth.with_both_sides(result)
     result = mouth.with_mouth_close(result)
-    return mouth.with_pairs(result)
+    result = mouth.with_pairs(result)
+    return result.evened(face.template.mirror) if _is_even(face) else result
+
+
+def _is_even(face):
+    """Whether the head is its own mirror image: then what rests on its middle line has no nearer side."""
+    mirrored = face.vertices[face.template.mirror] * [-1.0, 1.0, 1.0]
+    return bool(np.abs(mirrored - face.vertices).max() < _EVEN_MM)
 
 
 class _Mouth:
@@ -65,7 +73,7 @@ class _Mouth:
         self.face, self.options = face, options
         template = face.template
         self.skin = template.skin.vertex_slice
-        self.faces, _ = even_handed(template.faces[template.skin.face_slice], template.mirror)
+        self.faces = even_cut(template.faces[template.skin.face_slice], template.mirror, template.vertices[:, 0])
         self.seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
         rows = [part for part in template.parts if part.name.startswith("teeth")]
         teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]

@@ -15,6 +15,7 @@ from facewright.mesh.seam import seam_sides
 
 WEIGHTS = (0.25, 0.5, 0.75, 1.0)
 CROSSING_BAR_MM, TEETH_BAR_MM, CLOSE_BAR_MM = 0.3, 0.3, 0.5
+BARS_MM = {"crossing_mm": CROSSING_BAR_MM, "teeth_mm": TEETH_BAR_MM, "through_mm": 0.0}
 LIP_REACH_MM = 12.0  # along the skin from the seam, outwards and inwards: what counts as lip
 FACE_MM = 45.0  # from the seam: skin that teeth could stand out of
 MOST_MM = 8.0  # nothing crosses deeper: what seems to has met the other lip from behind
@@ -36,9 +37,9 @@ def mouth_pairs():
     return {f"{a} + {b}": {a: 1.0, b: 1.0} for a, b in pairs}
 
 
-def mouth_poses(rig):
-    """name -> weights of all poses of the mouth: each shape that moves lips at four weights, sides apart and together,
-    then the pairs. mouthClose is made for an open jaw and comes with it."""
+def mouth_poses(rig, at=WEIGHTS):
+    """name -> weights of all poses of the mouth: each shape that moves lips at several weights, sides apart and
+    together, then the pairs. mouthClose is made for an open jaw and comes with it."""
     poses = {}
     skin = rig.meshes[0]
     lips = rig.regions["lips"]
@@ -47,7 +48,7 @@ def mouth_poses(rig):
     moving = [n for n in names if np.abs(skin.deltas[rig.target_names.index(n), lips]).max(initial=0.0) > MOVES_MM]
     both = [n.removesuffix("Left") for n in moving if n.endswith("Left") and n.startswith("mouth") and len(n) > 9]
     for name in [*moving, *both]:
-        for weight in WEIGHTS:
+        for weight in at:
             weights = {name: weight}
             if name == "mouthClose":
                 weights["jawOpen"] = weight
@@ -67,10 +68,11 @@ def _both_sides(weights, names):
     return found
 
 
-def measure_mouth(rig, poses=None):
+def measure_mouth(rig, poses=None, plain=True):
     """dict: "lip_gap_mm" of the neutral, "mouth_close_gap_mm", "upper_teeth_moved_mm", "neck_moved_mm" and "poses".
 
-    poses name -> {"crossing_mm", "teeth_mm", "through_mm"}, each a pair (with in-betweens and correctives, plain 52):
+    poses name -> {"crossing_mm", "teeth_mm", "through_mm"}, each a pair (with in-betweens and correctives, plain 52);
+    without plain only the first of the two
     crossing_mm  depth of the deepest vertex of a lip inside the other lip
     teeth_mm     depth of the deepest vertex of a lip inside the teeth
     through_mm   how far a tooth stands out of the outer skin, beyond the red of the lips
@@ -78,6 +80,7 @@ def measure_mouth(rig, poses=None):
     """
     mouth = _Mouth(rig)
     poses = mouth_poses(rig) if poses is None else poses
+    columns = (True, False) if plain else (True,)
     result = {
         "lip_gap_mm": float(lip_gaps_mm(mouth.skin.vertices, rig.lines).max()),
         "upper_teeth_moved_mm": _moved(rig, "teeth_upper"),
@@ -86,10 +89,10 @@ def measure_mouth(rig, poses=None):
     }
     closed = {"jawOpen": 1.0, "mouthClose": 1.0}
     if set(closed) <= set(rig.target_names):
-        gaps = [lip_gaps_mm(mouth.posed(mouth.skin, closed, full), rig.lines).max() for full in (True, False)]
+        gaps = [lip_gaps_mm(mouth.posed(mouth.skin, closed, full), rig.lines).max() for full in columns]
         result["mouth_close_gap_mm"] = tuple(map(float, gaps))
     for name, weights in poses.items():
-        pairs = zip(*(mouth.figures(weights, full) for full in (True, False)))
+        pairs = zip(*(mouth.figures(weights, full) for full in columns))
         result["poses"][name] = dict(zip(("crossing_mm", "teeth_mm", "through_mm"), pairs))
     return result
 

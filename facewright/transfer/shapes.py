@@ -75,6 +75,19 @@ def even_handed(faces, mirror):
     return np.concatenate([faces, twins[alone]]), np.append(weights, np.full(alone.sum(), 0.5))
 
 
+def even_cut(faces, mirror, x):
+    """Triangles (m, 3) with quads cut on the right as on the left, so that a head's sides are meshed alike.
+
+    x (n,) of the template's vertices; quads across the midline stay as they are
+    """
+    twins = mirror[faces][:, [0, 2, 1]]
+    n = len(mirror)
+    keys, twin_keys = (np.sort(F, axis=1) @ [n * n, n, 1] for F in (faces, twins))
+    alone = ~np.isin(twin_keys, keys)
+    left, right = (x[faces] >= -1e-6).all(axis=1), (x[faces] <= 1e-6).all(axis=1)
+    return np.concatenate([faces[~(alone & right)], twins[alone & left]])
+
+
 def feature_links(lines, vertices, options=None):
     """Links between the lid margins of each eye and between the lips, from feature lines (as in Face)."""
     options = options or TransferOptions()
