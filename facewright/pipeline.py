@@ -12,7 +12,7 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
-from facewright.contact import Targets, find_jaw, part_lips, solve_eyes, solve_mouth
+from facewright.contact import Targets, find_jaw, hold_neck, part_lips, solve_eyes, solve_mouth
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
@@ -233,7 +233,7 @@ def _parts(run, face, template):
 
 def _transfer(run, face, template):
     def work():
-        targets = solve_mouth(face, solve_eyes(face, transfer_shapes(face)))
+        targets = solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))))
         bare = _assembled(face, targets, options=AssemblyOptions(eyes=None))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.

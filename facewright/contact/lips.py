@@ -171,7 +171,8 @@ class LipContact:
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
         way = found.points - skin[mine]
-        maybe = ((way * normal).sum(axis=1) > self.options.touch_mm) & (found.distance < _MOST_MM)
+        depth = found.distance
+        maybe = ((way * normal).sum(axis=1) > 0) & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
         return mine[maybe], corners[maybe], found.barycentric[maybe], (way + self.options.gap_mm * normal)[maybe]
 

@@ -14,7 +14,7 @@ from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
 
 HALF = 0.5
-_MOVES_MM = 0.02
+_MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
 _EVEN_MM = 1e-6
 PAIRS = (
     ("mouthSmile", "jawOpen"),
