@@ -73,7 +73,8 @@ def _strengths(face, rotation, carried):
     source, deltas = template.vertices[:stop], template.deltas[:, :stop]
     factors = line_strengths(source, face.vertices[:stop], deltas, carried, face.lines, rotation)
     jaw = [part.vertex_slice for part in template.parts if part.attach == "jaw"]
-    with_jaw = np.any([template.deltas[:, part].any(axis=(1, 2)) for part in jaw], axis=0) if jaw else False
+    motion = [np.abs(template.deltas[:, part]).max(axis=(1, 2)) for part in jaw]
+    with_jaw = np.max([np.zeros(len(factors)), *motion], axis=0) > _REST_MM
     corrective = [name in CORRECTIVE_BASE for name in template.shape_names]
     return np.where(with_jaw | np.array(corrective), 1.0, factors)
 
