@@ -167,7 +167,7 @@ def _run_job(run, path, output, options, inputs, template, folder):
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, face, template)
-    shapes, figures = _transfer(run, face, template)
+    shapes, figures = _transfer(run, face, template, options.jobs)
     maps = _bake(run, scan, face, options)
     report = _write(run, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
@@ -231,9 +231,10 @@ def _parts(run, face, template):
     return unpack_face(arrays, info, template)
 
 
-def _transfer(run, face, template):
+def _transfer(run, face, template, jobs):
     def work():
-        targets = solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))))
+        targets = solve_eyes(face, hold_neck(face, transfer_shapes(face)))
+        targets = solve_mouth(face, targets, jobs=jobs)
         bare = _assembled(face, targets, options=AssemblyOptions(eyes=None))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
