@@ -162,8 +162,10 @@ class _Mouth:
     def with_halves(self, targets):
         """Targets with an in-between for shapes whose way no straight line follows: it passes round the teeth."""
         names = [name for name in self.options.halves if name in targets.names]
-        path = (HALF, 0.5 * HALF, 1.5 * HALF)
-        lacks = self._each(lambda name: self._lack(targets, {name: 1.0}, weights=path, acts=_hat), names)
+        for name in names:
+            targets = self._corrected(targets, {name: 1.0}, {name: 1.0}, weights=(1.0,))
+        path = {"weights": (HALF, 0.5 * HALF, 1.5 * HALF), "acts": _hat}
+        lacks = self._each(lambda name: self._lack(targets, {name: 1.0}, **path), names)
         extras, in_betweens = dict(targets.extras), dict(targets.in_betweens)
         for name, lack in zip(names, lacks):
             half = in_between_name(name, HALF)
