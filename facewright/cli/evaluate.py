@@ -2,7 +2,7 @@
 
   facewright evaluate result/
   facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
-  facewright evaluate rig result/                 # bars of the finished rig: lids and eyeballs
+  facewright evaluate rig result/                 # bars of the finished rig: eyes, lips, teeth, jaw
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
   facewright evaluate compression TEXTURES/ --neutral neutral.png --mesh neutral.obj --out figures/   # FaceZip
 
@@ -45,7 +45,7 @@ def run(options):
         evaluate(folder, options)
         return
     if what == ["rig"]:
-        print_eyes(Path(folder), options.json)
+        print_rig(Path(folder), options.json)
         return
     if what:
         raise InputError(f"evaluate: one folder at a time, got {len(options.result)}; or: evaluate rig FOLDER")
@@ -66,25 +66,57 @@ def run(options):
         print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
 
 
-def print_eyes(folder, as_json):
-    """The bars of lids and eyeballs: with in-betweens and correctives, and the plain 52 beside them."""
-    from facewright.evaluate.eyes import DEPTH_BAR_MM, GAP_BAR_MM, measure_eyes
+def print_rig(folder, as_json):
+    """The bars of lids, eyeballs, lips, teeth and jaw: with in-betweens and correctives, and the plain 52 beside."""
+    from facewright.evaluate import eyes, mouth
+    from facewright.evaluate.rig import measure_jaw
     from facewright.write.rig import read_rig
 
-    eyes = measure_eyes(read_rig(folder / "rig"))
+    rig = read_rig(folder / "rig")
+    figures = {"eyes": eyes.measure_eyes(rig), "mouth": mouth.measure_mouth(rig), "jaw": measure_jaw(rig)}
     if as_json:
-        print(json.dumps(eyes, indent=1))
+        print(json.dumps(figures, indent=1))
         return
+    of_eyes, of_mouth, jaw = figures.values()
     print(
-        f"eyeball radius {eyes['radius_mm']:.2f} mm (11.5 to 12.5), lid gap at rest {eyes['lid_gap_mm']:.2f} mm (0.3)"
+        f"eyeball radius {of_eyes['radius_mm']:.2f} mm (11.5 to 12.5), lid gap at rest {of_eyes['lid_gap_mm']:.2f} mm "
+        f"(0.3), lip gap at rest {of_mouth['lip_gap_mm']:.2f} mm (0.3)"
     )
-    print("  ".join(["pose".ljust(28), "figure".ljust(10), "bar".rjust(5), "full".rjust(6), "plain".rjust(6)]))
-    for pose, figures in eyes["poses"].items():
-        for key, bar in (("depth_mm", DEPTH_BAR_MM), ("margins_mm", GAP_BAR_MM)):
-            if key in figures:
+    print(
+        f"upper teeth move by {of_mouth['upper_teeth_moved_mm']:.2f} mm (0), the neck ring by "
+        f"{of_mouth['neck_moved_mm']:.2f} mm (0)"
+    )
+    if jaw is not None:
+        print(
+            f"jawOpen and jaw bone differ by: teeth {jaw['teeth_mm']:.3f} mm, skin {jaw['skin_mean_mm']:.1f} mm mean, "
+            f"{jaw['skin_p95_mm']:.1f} p95; hinge {jaw['before_ear_mm']:.0f} mm before the ear"
+        )
+    print("  ".join(["pose".ljust(34), "figure".ljust(11), "bar".rjust(5), "full".rjust(6), "plain".rjust(6)]))
+    print_bars(of_eyes["poses"], {"depth_mm": eyes.DEPTH_BAR_MM, "margins_mm": eyes.GAP_BAR_MM})
+    closed = {"jawOpen + mouthClose": {"gap_mm": of_mouth.get("mouth_close_gap_mm", ())}}
+    print_bars(closed, {"gap_mm": mouth.CLOSE_BAR_MM})
+    print_bars(worst_on_the_way(of_mouth["poses"]), mouth.BARS_MM)
+
+
+def worst_on_the_way(poses):
+    """Poses of one shape ("mouthSmile 0.5") as one, with the worst figure at any weight."""
+    result = {}
+    for pose, figures in poses.items():
+        name, _, weight = pose.rpartition(" ")
+        known = result.setdefault(name if weight.replace(".", "").isdigit() else pose, {})
+        for key, values in figures.items():
+            known[key] = tuple(map(max, zip(known.get(key, values), values)))
+    return result
+
+
+def print_bars(poses, bars):
+    """A line for each figure of each pose that has a bar; what misses it is marked."""
+    for pose, figures in poses.items():
+        for key, bar in bars.items():
+            if figures.get(key):
                 full, plain = figures[key]
                 verdict = "" if full <= bar else "  missed"
-                print(f"{pose.ljust(28)}  {key.ljust(10)}  {bar:5.2f}  {full:6.2f}  {plain:6.2f}{verdict}")
+                print(f"{pose.ljust(34)}  {key.ljust(11)}  {bar:5.2f}  {full:6.2f}  {plain:6.2f}{verdict}")
 
 
 def collect(folder, scan_file=None, shapes=False):

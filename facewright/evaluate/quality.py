@@ -141,9 +141,9 @@ def region_faces(mask, faces):
 
 
 def rim_faces(vertices, faces, lines, ends, rim_mm):
-    """(m,) bool: faces within rim_mm of lines of contact (each (k,)): the thickness of lids and lips, that turns inward.
+    """(m,) bool: faces within rim_mm of lines of contact (each (k,)): the thickness of lids and lips.
 
-    ends (c, 3): canthi or corners; between the end of a line and the corner before it, the groove is part of the opening
+    ends (c, 3): canthi or corners; between a line's end and the corner before it, the groove is part of the opening
     """
     margins = [vertices[line] for line in lines]
     tips = np.array([tip for margin in margins for tip in margin[[0, -1]]])

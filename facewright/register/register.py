@@ -153,7 +153,7 @@ def _unfolded(template, skin, faces, matches):
 def _without_knots(template, skin, faces):
     """Skin (n, 3) with the knots of lips and lids smoothed away.
 
-    The lip seam and the skin beside them hold; only where a knot does not come loose, what lies around it gives way too.
+    The lip seam and the skin beside them hold; what lies around a knot gives way only where it does not come loose.
     """
     n = len(skin)
     knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
