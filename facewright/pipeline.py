@@ -60,8 +60,8 @@ class JobOptions:
     eyes          "template": closed lids are opened to the template's aperture; "as-scanned": left as they are
     landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
     formats       what to write: glb, obj
-    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": in-betweens ("name@0.5")
-                  and pair correctives ("a+b") too. rig/ always has all of them
+    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": left and right halves in
+                  place of their sums, in-betweens ("name@0.5") and pair correctives ("a+b"). rig/ always has all
     jobs          threads inside the job; the result does not depend on it
     from_stage    run this stage and all after it again, whatever is cached
     """
@@ -264,7 +264,7 @@ def _write(run, scan, face, shapes, maps, found, output, options):
     def work():
         rig = build_rig(face, shapes.deltas, maps, eyes=shapes)
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
-        carried = rig if options.shapes == "full" else rig.plain()
+        carried = rig.full() if options.shapes == "full" else rig.plain()
         report = plain(build_report(scan, face, carried, *found))
         earlier = run.store.last_info("07-write").get("files", {})
         with output.workshop() as folder:
@@ -280,7 +280,7 @@ def _write(run, scan, face, shapes, maps, found, output, options):
 def write_results(rig, maps, scan, face, folder, options):
     """Every file of a result but report.json and stages/."""
     plain_rig = rig.plain()
-    carried = rig if options.shapes == "full" else plain_rig
+    carried = rig.full() if options.shapes == "full" else plain_rig
     if "glb" in options.formats:
         write_gltf(carried, folder / "rig.glb")
     if "obj" in options.formats:
