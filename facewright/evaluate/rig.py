@@ -1,17 +1,11 @@
-"""Figures of a finished rig: how far its neutral is from a scan, and whether its shapes are sound."""
+"""Figures of a finished rig: how far its neutral is from a scan."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from facewright.evaluate.distances import face_to_scan, scan_to_face
-from facewright.evaluate.quality import (
-    folded_by_shape,
-    lip_gaps_mm,
-    new_self_intersections,
-    region_faces,
-    torn_edges,
-)
+from facewright.evaluate.quality import lip_gaps_mm
 
 
 def measure_rig_distances(rig, scan, *, count=40000):
@@ -34,29 +28,6 @@ def measure_rig_distances(rig, scan, *, count=40000):
     there = scan_to_face(surface, vertices, faces, regions, count=count)
     back = face_to_scan(surface, vertices, faces, regions, count=count // 2)
     return {name: {"scan_to_rig": there[name], "rig_to_scan": back[name]} for name in regions}
-
-
-def measure_shapes(rig):
-    """dict target -> {"max_mm", "folded", "torn", "crossing"} of every shape of the skin at weight 1.
-
-    folded and torn outside the inner mouth; crossing: new pairs of crossing faces with one in region `face`
-    """
-    skin = rig.meshes[0]
-    inner = rig.regions["mouth_interior"]
-    outside = ~inner[skin.faces].any(axis=1)
-    in_face = region_faces(rig.regions["face"], skin.faces)
-    everything = np.ones(len(skin.faces), bool)
-    result = {}
-    for name, deltas in zip(rig.target_names, skin.deltas):
-        moved = skin.vertices + deltas
-        crossing = new_self_intersections(moved, skin.vertices, skin.faces, everything, in_face)
-        result[name] = {
-            "max_mm": float(np.linalg.norm(deltas, axis=1).max()),
-            "folded": len(folded_by_shape(skin.vertices, moved, skin.faces, outside)),
-            "torn": len(torn_edges(skin.vertices, moved, skin.faces, ~inner)),
-            "crossing": len(crossing),
-        }
-    return result
 
 
 def measure_neutral(rig):
