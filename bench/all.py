@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ORDER = ("transfer", "bake", "registration_truth", "real_scans", "invariance", "job")
+ORDER = ("transfer", "shapes", "bake", "registration_truth", "real_scans", "invariance", "job")
 
 
 def main():
