@@ -19,6 +19,7 @@ from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
 _ROUNDS = 3
+_CORNER_MM = 2.0
 
 
 @dataclass(frozen=True)
@@ -137,9 +138,15 @@ class _Eye:
         upper, lower = (
             np.radians(turn) * profile for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
         )
-        open_u, open_l = self.lids.opening(self.V)
-        share = self.options.lids.upper_share
-        return self.lids.turned(self.V, upper - share * open_u, lower + (1 - share) * open_l, ball)
+        close_u, close_l = self._closing_turns()
+        return self.lids.turned(self.V, upper + close_u, lower + close_l, ball, self.lids.slides(self.V))
+
+    def _closing_turns(self):
+        """(u,), (l,) radians that bring both margins of the neutral to the closing line, where they will have slid."""
+        lids = self.lids
+        slides = lids.slides(self.V)
+        goals = lids.closing(self.V, slides)
+        return [goal - lids.angles(self.V[line]) for goal, line in zip(goals, (lids.upper, lids.lower))]
 
     def diagonals(self, names):
         """Pairs of look shapes that add up to a look past a corner of the eye."""
@@ -161,9 +168,8 @@ class _Eye:
         return full
 
     def _blink(self, weight):
-        open_u, open_l = self.lids.opening(self.V)
-        share = self.options.lids.upper_share
-        pose = self.lids.turned(self.V, -weight * share * open_u, weight * (1 - share) * open_l)
+        slides = [weight * slide for slide in self.lids.slides(self.V)]
+        pose = self.lids.turned(self.V, *(weight * turn for turn in self._closing_turns()), slides=slides)
         return self.lids.flush(pose) if weight == 1.0 else pose
 
     def _wide(self, weight):
@@ -177,7 +183,8 @@ class _Eye:
         wanted_l = self.lids.angles(self.V[lower]) + self.options.squint_share[1] * open_l
         turn_u = wanted_u - self.lids.angles(pose[upper])
         turn_l = wanted_l - self.lids.angles(pose[lower])
-        return self.lids.turned(pose, turn_u, turn_l)
+        # Towards the canthi, which stay with the skin, the margins do too: else they would be torn off the corner.
+        return self.lids.turned(pose, *(turn * _ramp(self.V[c]) for turn, c in ((turn_u, upper), (turn_l, lower))))
 
     def _look(self, direction, own, weight):
         R = gaze_rotation(direction, self.side, weight)
@@ -196,9 +203,16 @@ class _Eye:
     def _full(self, pose):
         """(n, 3) delta of all parts from a pose of the skin."""
         delta = np.zeros(self.face.vertices.shape)
-        delta[self.skin] = pose - self.V
+        delta[self.skin] = self.lids.settled(pose) - self.V
         delta[np.abs(delta).max(axis=1) < 1e-4] = 0.0
         return delta
+
+
+def _ramp(chain):
+    """(k,) 0 at the canthi, 1 from _CORNER_MM on along a margin."""
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    share = np.clip(np.minimum(steps, steps[-1] - steps) / _CORNER_MM, 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
 
 
 def _profile(chain):

@@ -15,7 +15,6 @@ from facewright.mesh.raster import Camera, RayScene
 SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
 RIM_MM = 2.0
-_HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
 
 
 def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
@@ -50,40 +49,6 @@ def _near_box(vertices, faces, points, margin_mm=5.0):
     """(m,) bool: faces in the box around points (k, 3)."""
     centers = vertices[faces].mean(axis=1)
     return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
-
-
-def folded_by_shape(neutral, moved, faces, mask=None):
-    """Indices of faces turned by more than 90 degrees against the neutral after the best rotation around them.
-
-    neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
-    fitted to the corners of all faces that share a vertex with it (Kabsch). Only faces that turn at all are asked.
-    """
-    turned = (face_normals(neutral, faces) * face_normals(moved, faces)).sum(axis=1) < _HARDLY_TURNED
-    asked = np.flatnonzero(turned if mask is None else turned & mask)
-    if not len(asked):
-        return asked
-    touched = np.zeros(len(neutral), bool)
-    touched[faces[asked]] = True
-    covariance = _vertex_covariance(neutral, moved, faces[touched[faces].any(axis=1)])
-    around = covariance[faces[asked]].sum(axis=1)  # (k, 3, 3)
-    U, _, Vt = np.linalg.svd(around)
-    flip = np.linalg.det(U @ Vt) < 0
-    U[flip, :, 2] *= -1
-    expected = np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces[asked]))
-    return asked[(expected * face_normals(moved, faces[asked])).sum(axis=1) < 0]
-
-
-def _vertex_covariance(neutral, moved, faces):
-    """(n, 3, 3) sums over the faces at a vertex of (rest edge)(moved edge)^T."""
-    total = np.zeros((len(neutral), 3, 3))
-    outer = sum(
-        (neutral[faces[:, b]] - neutral[faces[:, a]])[:, :, None]
-        * (moved[faces[:, b]] - moved[faces[:, a]])[:, None, :]
-        for a, b in ((0, 1), (1, 2), (2, 0))
-    )
-    for corner in range(3):
-        np.add.at(total, faces[:, corner], outer)
-    return total
 
 
 def torn_edges(neutral, moved, faces, mask=None, *, grow_mm=4.0, factor=3.0):

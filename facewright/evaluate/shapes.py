@@ -7,8 +7,9 @@ from scipy.spatial import cKDTree
 
 from facewright.conventions import INTERPUPILLARY_MM, mirrored_name
 from facewright.evaluate.play import Player
-from facewright.evaluate.quality import folded_by_shape, new_self_intersections, torn_edges
+from facewright.evaluate.quality import new_self_intersections, torn_edges
 from facewright.evaluate.rows import Row
+from facewright.mesh.folds import folded_by_shape
 from facewright.working_set import read_working_set
 
 MIRROR_X = np.array([-1.0, 1.0, 1.0])
