@@ -103,7 +103,11 @@ class _Eye:
         """shape name -> {weight: (n, 3) delta} of this eye's shapes that the template has."""
         side = self.side.capitalize()
         made = {f"eyeBlink{side}": self._blink, f"eyeWide{side}": self._wide}
-        found = {name: {w: self._full(make(w)) for w in (HALF, 1.0)} for name, make in made.items() if name in names}
+        found = {
+            name: {w: self._full(make(w), shut=make == self._blink and w == 1.0) for w in (HALF, 1.0)}
+            for name, make in made.items()
+            if name in names
+        }
         squint = f"eyeSquint{side}"
         if squint in names:
             own = deltas[names.index(squint), self.skin]
@@ -131,7 +135,7 @@ class _Eye:
             # margins have slid along the axis.
             open_u, open_l = self.lids.opening(closed)
             closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball)
-        return self._full(self.lids.flush(closed) - pose + self.V)
+        return self._full(self.lids.flush(closed), pose, shut=True)
 
     def _turned_both(self, direction, ball):
         """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
@@ -160,7 +164,7 @@ class _Eye:
         looks = look_shapes(self.side)
         turns = [gaze_rotation(looks[name], self.side) for name in pair]
         R = Rotation.from_rotvec(sum(Rotation.from_matrix(turn).as_rotvec() for turn in turns)).as_matrix()
-        full = self._full(self.lids.lifted(pose, turned_ball(self.ball, R)) - pose + self.V)
+        full = self._full(self.lids.lifted(pose, turned_ball(self.ball, R)), pose)
         # Two turns added up as chords swell the ball: it gets the one turn that they mean.
         missing = R - turns[0] - turns[1] + np.eye(3)
         for part in eye_parts(self.face.template, self.side):
@@ -200,10 +204,10 @@ class _Eye:
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
         return self.lids.turned(pose, upper, lower, ball)
 
-    def _full(self, pose):
-        """(n, 3) delta of all parts from a pose of the skin."""
+    def _full(self, pose, base=None, shut=False):
+        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose; shut: its lids meet."""
         delta = np.zeros(self.face.vertices.shape)
-        delta[self.skin] = self.lids.settled(pose) - self.V
+        delta[self.skin] = self.lids.settled(pose, shut) - (self.V if base is None else base)
         delta[np.abs(delta).max(axis=1) < 1e-4] = 0.0
         return delta
 

@@ -23,6 +23,7 @@ from facewright.transfer.eyeball import lid_clearance
 _KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
 _CORNER_MM = 6.0  # around a canthus the field is evened out
 _LOOSE = 4  # margin points from a canthus on, itself included, that may be smoothed with a fold
+_JOININGS = 2
 _WAVES = 2  # of the closing line between the canthi
 
 
@@ -168,9 +169,28 @@ class Lids:
         result[inside] = factor.solve(-(rest @ field[~inside]))
         return result
 
-    def settled(self, pose):
-        """The pose (n, 3) without folded faces: where the corners press skin together it is smoothed."""
+    def settled(self, pose, shut=False):
+        """The pose (n, 3) without folded faces: where the corners press skin together it is smoothed.
+
+        shut: the margins shall meet, also where they were smoothed
+        """
+        for _ in range(_JOININGS if shut else 0):
+            flat = laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
+            if flat is pose:
+                return pose
+            pose = self._joined(flat)
         return laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
+
+    def _joined(self, pose):
+        """The pose (n, 3) with the margins' ends half way between each other."""
+        at = pose @ self.axis
+        result = pose.copy()
+        for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
+            ends = np.concatenate([own[1:_LOOSE], own[-2 : -_LOOSE - 1 : -1]])
+            across = np.stack([_along(at[ends], at[other], pose[other, i]) for i in range(3)], axis=1)
+            fading = np.tile(np.linspace(0.5, 0.1, _LOOSE - 1), 2)[:, None]
+            result[ends] += fading * (across - pose[ends])
+        return result
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""

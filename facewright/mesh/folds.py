@@ -10,7 +10,8 @@ from facewright.mesh.normals import face_normals
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
 
-_PATIENCE = 8
+_PATIENCE = 5
+_AROUND = 7  # rings around folds that smoothing may reach
 
 
 def folded_by_shape(neutral, moved, faces, mask=None):
@@ -63,20 +64,37 @@ def neighbour_mean(faces, n, lines=()):
     return (sp.diags(1.0 / np.maximum(np.asarray(W.sum(axis=1)).ravel(), 1.0)) @ W).tocsr()
 
 
-def laid_flat(neutral, moved, faces, keep, mean, *, rounds=40, step=0.5):
+def laid_flat(neutral, moved, faces, keep, mean, *, rounds=20, step=0.5):
     """Vertices (n, 3) of a pose in which folded faces are smoothed with their neighbours until none is left.
 
     keep (n,) bool: vertices that stay; mean: neighbour_mean of the mesh. A round moves each vertex of a fold by `step`
-    of its way to the middle of its neighbours
+    of its way to the middle of its neighbours. Where nothing is folded, moved itself is returned
     """
-    result = np.array(moved)
     loose = ~keep[faces].all(axis=1)
+    folded = folded_by_shape(neutral, moved, faces, loose)
+    if not len(folded):
+        return moved
+    near = np.zeros(len(moved), bool)
+    near[faces[folded]] = True
+    near = dilate(near, faces, _AROUND)
+    used, local = np.unique(faces[near[faces].all(axis=1)], return_inverse=True)
+    local = local.reshape(-1, 3)
+    stays = keep[used] | ~_surrounded(mean, near)[used]
+    weights, rest, now = mean[used][:, used], neutral[used], moved[used]
+    loose = ~stays[local].all(axis=1)
     for number in range(rounds):
-        folded = folded_by_shape(neutral, result, faces, loose)
+        folded = folded_by_shape(rest, now, local, loose)
         if not len(folded):
             break
-        knot = np.zeros(len(moved), bool)
-        knot[faces[folded]] = True
-        knot = dilate(knot, faces, 1 + number // _PATIENCE) & ~keep  # what resists is smoothed with more around it
-        result[knot] += step * (mean[knot] @ result - result[knot])
+        knot = np.zeros(len(used), bool)
+        knot[local[folded]] = True
+        knot = dilate(knot, local, 1 + number // _PATIENCE) & ~stays  # what resists is smoothed with more around it
+        now[knot] += step * (weights[knot] @ now - now[knot])
+    result = np.array(moved)
+    result[used] = now
     return result
+
+
+def _surrounded(mean, mask):
+    """(n,) bool: vertices all of whose neighbours are in a mask (n,)."""
+    return np.asarray((mean != 0) @ (~mask).astype(float)).ravel() == 0
