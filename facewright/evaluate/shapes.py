@@ -7,9 +7,10 @@ from scipy.spatial import cKDTree
 
 from facewright.conventions import INTERPUPILLARY_MM, mirrored_name
 from facewright.evaluate.play import Player
-from facewright.evaluate.quality import new_self_intersections, torn_edges
+from facewright.evaluate.quality import torn_edges
 from facewright.evaluate.rows import Row
 from facewright.mesh.folds import folded_by_shape
+from facewright.mesh.intersect import self_intersections
 from facewright.working_set import read_working_set
 
 MIRROR_X = np.array([-1.0, 1.0, 1.0])
@@ -33,6 +34,7 @@ class SkinCheck:
         self.outside = ~inner
         self.outer = rig.regions.get("outer", np.ones(n, bool))
         self._asked = self.outside[self.skin.faces].all(axis=1)
+        self._before = None
         self._face = rig.regions.get("face", np.ones(n, bool))[self.skin.faces].all(axis=1)
 
     def folded(self, moved):
@@ -45,15 +47,21 @@ class SkinCheck:
 
     def crossing(self, moved):
         """Number of crossing pairs, one in the face, that the neutral has not; only what moves is looked at."""
-        going = np.abs(moved - self.skin.vertices).max(axis=1) > _STILL_MM
+        rest, faces = self.skin.vertices, self.skin.faces
+        going = np.abs(moved - rest).max(axis=1) > _STILL_MM
         if not going.any():
             return 0
-        points = np.concatenate([moved[going], self.skin.vertices[going]])
-        inside = (
-            (self.skin.vertices > points.min(axis=0) - 1.0) & (self.skin.vertices < points.max(axis=0) + 1.0)
-        ).all(1)
-        among = (inside | going)[self.skin.faces].any(axis=1)
-        return len(new_self_intersections(moved, self.skin.vertices, self.skin.faces, among, self._face))
+        low, high = moved[going].min(axis=0) - 1.0, moved[going].max(axis=0) + 1.0
+        near = going | ((rest > low) & (rest < high)).all(axis=1)
+        now = self_intersections(moved, faces, near[faces].any(axis=1))
+        now = now[self._face[now].any(axis=1)]
+        if self._before is None:
+            self._before = _pair_keys(self_intersections(rest, faces), faces)
+        return int((~np.isin(_pair_keys(now, faces), self._before)).sum())
+
+
+def _pair_keys(pairs, faces):
+    return pairs[:, 0] * len(faces) + pairs[:, 1]
 
 
 def eye_scale(rig):
