@@ -288,7 +288,7 @@ def write_results(rig, maps, scan, face, folder, options):
     write_credits(rig, folder / "CREDITS.txt")
     write_rig(rig, folder / "rig")
     write_textures(maps, folder / "textures", describe_maps(face, maps))
-    write_preview(plain_rig, scan, face, folder / "preview.png", options.jobs)
+    write_preview(rig, scan, face, folder / "preview.png", options.jobs)
 
 
 def _rig_to_scan(scan):

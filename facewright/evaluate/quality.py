@@ -51,9 +51,12 @@ def _near_box(vertices, faces, points, margin_mm=5.0):
     return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
 
 
-def torn_edges(neutral, moved, faces, mask=None, *, grow_mm=4.0, factor=3.0):
-    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices."""
-    edges = unique_edges(faces)
+def torn_edges(neutral, moved, faces, mask=None, *, edges=None, grow_mm=4.0, factor=3.0):
+    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices.
+
+    edges  unique_edges(faces), if they are known already
+    """
+    edges = unique_edges(faces) if edges is None else edges
     if mask is not None:
         edges = edges[mask[edges].all(axis=1)]
     rest = np.linalg.norm(neutral[edges[:, 0]] - neutral[edges[:, 1]], axis=1)

@@ -9,6 +9,7 @@ from facewright.conventions import INTERPUPILLARY_MM, mirrored_name
 from facewright.evaluate.play import Player
 from facewright.evaluate.quality import torn_edges
 from facewright.evaluate.rows import Row
+from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.folds import folded_by_shape
 from facewright.mesh.intersect import self_intersections
 from facewright.working_set import read_working_set
@@ -34,6 +35,7 @@ class SkinCheck:
         self.outside = ~inner
         self.outer = rig.regions.get("outer", np.ones(n, bool))
         self._asked = self.outside[self.skin.faces].all(axis=1)
+        self._edges = unique_edges(self.skin.faces)
         self._before = None
         self._face = rig.regions.get("face", np.ones(n, bool))[self.skin.faces].all(axis=1)
 
@@ -43,7 +45,7 @@ class SkinCheck:
 
     def torn(self, moved):
         """(k, 2) torn edges."""
-        return torn_edges(self.skin.vertices, moved, self.skin.faces, self.outside)
+        return torn_edges(self.skin.vertices, moved, self.skin.faces, self.outside, edges=self._edges)
 
     def crossing(self, moved):
         """Number of crossing pairs, one in the face, that the neutral has not; only what moves is looked at."""

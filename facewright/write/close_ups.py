@@ -1,0 +1,103 @@
+"""Close-ups of eyes and mouth for every shape and for the pairs, half way and whole: where rigs fail first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from facewright.evaluate.play import Player, both_sides
+from facewright.evaluate.shapes import shape_names, with_base
+from facewright.mesh.raster import Camera
+from facewright.mesh.scene import Scene
+from facewright.write.sheet import Cell, Section
+
+WEIGHTS = (0.5, 1.0)
+EYES, MOUTH = (116, 296), (196, 240)  # (height, width) in pixels
+MM_PER_PX = {EYES: 0.36, MOUTH: 0.36}
+COLUMNS = {EYES: 6, MOUTH: 7}
+EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
+MOUTH_PAIRS = (
+    ("mouthSmile", "jawOpen"),
+    ("mouthSmile", "mouthFunnel"),
+    ("mouthFunnel", "mouthPucker"),
+    ("mouthFrown", "mouthPress"),
+    ("mouthRollUpper", "mouthRollLower"),
+    ("mouthShrugUpper", "mouthShrugLower"),
+    ("tongueOut", "jawOpen"),
+)
+_UPPER = ("eye", "brow")  # shapes that a look at the eyes tells of; the rest is the mouth's
+_AROUND_MM = 30.0  # beyond the picture's edge: what may come into it
+
+
+def close_up_poses(rig):
+    """(eyes, mouth): dicts label -> weights of every shape of a rig, both sides of one together, and of the pairs."""
+    names = shape_names(rig)
+    one_name = dict.fromkeys(_without_side(name, names) for name in names)
+    poses = {name: with_base(name, names) for name in one_name}
+    poses |= {" + ".join(pair): dict.fromkeys(pair, 1.0) for pair in (*EYE_PAIRS, *MOUTH_PAIRS)}
+    poses = {label: both_sides(weights, names) for label, weights in poses.items()}
+    known = {label: weights for label, weights in poses.items() if weights is not None}
+    eyes = {label: weights for label, weights in known.items() if label.startswith(_UPPER)}
+    return eyes, {label: weights for label, weights in known.items() if label not in eyes}
+
+
+def close_up_sections(rig, drawables, picture, run):
+    """Sections of a contact sheet; played with in-betweens and correctives where the rig has them.
+
+    drawables  function (Rig) -> list of scene.Drawable; picture  function (Scene, Camera) -> (h, w, 3)
+    run        a map, that of a thread pool or the builtin one
+    """
+    play = Player(rig, full=True)
+    sections = []
+    titles = ("Eyes and brows, half way and whole", "Mouth, jaw and cheeks, half way and whole")
+    for title, size, center, poses in zip(titles, (EYES, MOUTH), _centers(rig), close_up_poses(rig)):
+        camera = Camera.looking_at(center, 0.0, 0.0, size[0] / 2.0 * MM_PER_PX[size], size)
+        jobs = [(label, weights, share) for label, weights in poses.items() for share in WEIGHTS]
+
+        def cell(job, camera=camera):
+            label, weights, share = job
+            posed = _posed(rig, play, {name: share * weight for name, weight in weights.items()}, camera)
+            return Cell(picture(Scene(drawables(posed)), camera), label if share == 1.0 else f"{label}, {share:g}")
+
+        cells = list(run(cell, jobs))
+        rows = tuple(tuple(cells[i : i + COLUMNS[size]]) for i in range(0, len(cells), COLUMNS[size]))
+        if rows:
+            sections.append(Section(title, rows, "both sides together; pairs last"))
+    return sections
+
+
+def _without_side(name, names):
+    """mouthSmileLeft and mouthSmileRight -> mouthSmile, where the rig has both; jawLeft stays."""
+    for side, other in (("Left", "Right"), ("Right", "Left")):
+        stem = name.removesuffix(side)
+        if stem != name and stem + other in names and stem not in ("jaw", "mouth"):
+            return stem
+    return name
+
+
+def _centers(rig):
+    """(3,) twice: the middle between the eyes' lids, and of the lips a little below."""
+    vertices = rig.meshes[0].vertices
+    found = []
+    for prefix, otherwise, shift in (("lid_", (0.0, 2.0, 0.0), 4.0), ("lip_", (0.0, -65.0, 0.0), -8.0)):
+        lines = [line for name, line in rig.lines.items() if name.startswith(prefix)]
+        middle = vertices[np.concatenate(lines)].mean(axis=0) if lines else np.array(otherwise)
+        found.append(middle + [0.0, shift, 0.0])
+    return found
+
+
+def _posed(rig, play, weights, camera):
+    """The Rig in a pose, without targets; only the faces that can come into the picture."""
+    half = camera.half_height * np.array([camera.size[1] / camera.size[0], 1.0]) + _AROUND_MM
+    meshes = []
+    for mesh in rig.meshes:
+        vertices = play(mesh, weights)
+        inside = (np.abs(vertices - camera.center)[:, :2] < half).all(axis=1)
+        kept = inside[mesh.faces].any(axis=1)
+        if kept.any():
+            faces, uv_faces = mesh.faces[kept], mesh.uv_faces[kept]
+            meshes.append(replace(mesh, vertices=vertices, faces=faces, uv_faces=uv_faces, deltas=None))
+        elif mesh is rig.meshes[0]:
+            meshes.append(replace(mesh, vertices=vertices, deltas=None))
+    return replace(rig, meshes=tuple(meshes))
