@@ -13,9 +13,8 @@ from facewright.mesh.scene import Scene
 from facewright.write.sheet import Cell, Section
 
 WEIGHTS = (0.5, 1.0)
-EYES, MOUTH = (116, 296), (196, 240)  # (height, width) in pixels
-MM_PER_PX = {EYES: 0.36, MOUTH: 0.36}
-COLUMNS = {EYES: 6, MOUTH: 7}
+SIZE = (152, 292)  # (height, width) in pixels
+COLUMNS = 6
 EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
 MOUTH_PAIRS = (
     ("mouthSmile", "jawOpen"),
@@ -24,22 +23,25 @@ MOUTH_PAIRS = (
     ("mouthFrown", "mouthPress"),
     ("mouthRollUpper", "mouthRollLower"),
     ("mouthShrugUpper", "mouthShrugLower"),
-    ("tongueOut", "jawOpen"),
 )
-_UPPER = ("eye", "brow")  # shapes that a look at the eyes tells of; the rest is the mouth's
+_UPPER, _MIDDLE = ("eye", "brow"), ("cheekSquint", "noseSneer")  # what is looked at; the rest is the mouth's
 _AROUND_MM = 30.0  # beyond the picture's edge: what may come into it
 
 
 def close_up_poses(rig):
-    """(eyes, mouth): dicts label -> weights of every shape of a rig, both sides of one together, and of the pairs."""
+    """Three dicts label -> weights, for the eyes, the middle of the face and the mouth: every shape of a rig, both
+    sides of one together, and the pairs."""
     names = shape_names(rig)
     one_name = dict.fromkeys(_without_side(name, names) for name in names)
     poses = {name: with_base(name, names) for name in one_name}
     poses |= {" + ".join(pair): dict.fromkeys(pair, 1.0) for pair in (*EYE_PAIRS, *MOUTH_PAIRS)}
     poses = {label: both_sides(weights, names) for label, weights in poses.items()}
-    known = {label: weights for label, weights in poses.items() if weights is not None}
-    eyes = {label: weights for label, weights in known.items() if label.startswith(_UPPER)}
-    return eyes, {label: weights for label, weights in known.items() if label not in eyes}
+    sorted_out = {}, {}, {}
+    for label, weights in poses.items():
+        if weights is not None:
+            where = 0 if label.startswith(_UPPER) else 1 if label.startswith(_MIDDLE) else 2
+            sorted_out[where][label] = weights
+    return sorted_out
 
 
 def close_up_sections(rig, drawables, picture, run):
@@ -49,10 +51,9 @@ def close_up_sections(rig, drawables, picture, run):
     run        a map, that of a thread pool or the builtin one
     """
     play = Player(rig, full=True)
+    titles = ("Eyes and brows", "Cheeks and nose", "Mouth and jaw")
     sections = []
-    titles = ("Eyes and brows, half way and whole", "Mouth, jaw and cheeks, half way and whole")
-    for title, size, center, poses in zip(titles, (EYES, MOUTH), _centers(rig), close_up_poses(rig)):
-        camera = Camera.looking_at(center, 0.0, 0.0, size[0] / 2.0 * MM_PER_PX[size], size)
+    for title, camera, poses in zip(titles, _cameras(rig), close_up_poses(rig)):
         jobs = [(label, weights, share) for label, weights in poses.items() for share in WEIGHTS]
 
         def cell(job, camera=camera):
@@ -61,9 +62,9 @@ def close_up_sections(rig, drawables, picture, run):
             return Cell(picture(Scene(drawables(posed)), camera), label if share == 1.0 else f"{label}, {share:g}")
 
         cells = list(run(cell, jobs))
-        rows = tuple(tuple(cells[i : i + COLUMNS[size]]) for i in range(0, len(cells), COLUMNS[size]))
+        rows = tuple(tuple(cells[i : i + COLUMNS]) for i in range(0, len(cells), COLUMNS))
         if rows:
-            sections.append(Section(title, rows, "both sides together; pairs last"))
+            sections.append(Section(f"{title}, half way and whole", rows, "both sides together; pairs last"))
     return sections
 
 
@@ -76,15 +77,16 @@ def _without_side(name, names):
     return name
 
 
-def _centers(rig):
-    """(3,) twice: the middle between the eyes' lids, and of the lips a little below."""
+def _cameras(rig):
+    """Cameras on the eyes with the brows, on the middle of the face, and on the mouth with the chin."""
     vertices = rig.meshes[0].vertices
-    found = []
-    for prefix, otherwise, shift in (("lid_", (0.0, 2.0, 0.0), 4.0), ("lip_", (0.0, -65.0, 0.0), -8.0)):
+    middles = []
+    for prefix, otherwise in (("lid_", (0.0, 2.0, 0.0)), ("lip_", (0.0, -65.0, 0.0))):
         lines = [line for name, line in rig.lines.items() if name.startswith(prefix)]
-        middle = vertices[np.concatenate(lines)].mean(axis=0) if lines else np.array(otherwise)
-        found.append(middle + [0.0, shift, 0.0])
-    return found
+        middles.append(vertices[np.concatenate(lines)].mean(axis=0) if lines else np.array(otherwise))
+    eyes, mouth = middles
+    frames = ((eyes + [0.0, 8.0, 0.0], 27.0), (0.5 * (eyes + mouth), 46.0), (mouth + [0.0, -9.0, 0.0], 36.0))
+    return [Camera.looking_at(center, 0.0, 0.0, half_height, SIZE) for center, half_height in frames]
 
 
 def _posed(rig, play, weights, camera):
