@@ -230,9 +230,20 @@ def _parts(run, face, template):
     return unpack_face(arrays, info, template)
 
 
+def shapes_of(face):
+    """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
+    return solve_eyes(face, transfer_shapes(face))
+
+
+def rig_from_face(face, maps=None):
+    """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
+    shapes = shapes_of(face)
+    return build_rig(face, shapes.deltas, maps, eyes=shapes)
+
+
 def _transfer(run, face, template):
     def work():
-        eyes = solve_eyes(face, transfer_shapes(face))
+        eyes = shapes_of(face)
         info = {"names": list(template.shape_names), "extras": list(eyes.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
         info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in eyes.in_betweens.items()]

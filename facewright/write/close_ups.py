@@ -53,12 +53,12 @@ def close_up_sections(rig, drawables, picture, run):
     play = Player(rig, full=True)
     titles = ("Eyes and brows", "Cheeks and nose", "Mouth and jaw")
     sections = []
-    for title, camera, poses in zip(titles, _cameras(rig), close_up_poses(rig)):
+    for title, camera, poses in zip(titles, close_up_cameras(rig), close_up_poses(rig)):
         jobs = [(label, weights, share) for label, weights in poses.items() for share in WEIGHTS]
 
         def cell(job, camera=camera):
             label, weights, share = job
-            posed = _posed(rig, play, {name: share * weight for name, weight in weights.items()}, camera)
+            posed = posed_rig(rig, play, {name: share * weight for name, weight in weights.items()}, camera)
             return Cell(picture(Scene(drawables(posed)), camera), label if share == 1.0 else f"{label}, {share:g}")
 
         cells = list(run(cell, jobs))
@@ -77,7 +77,7 @@ def _without_side(name, names):
     return name
 
 
-def _cameras(rig):
+def close_up_cameras(rig):
     """Cameras on the eyes with the brows, on the middle of the face, and on the mouth with the chin."""
     vertices = rig.meshes[0].vertices
     middles = []
@@ -89,7 +89,7 @@ def _cameras(rig):
     return [Camera.looking_at(center, 0.0, 0.0, half_height, SIZE) for center, half_height in frames]
 
 
-def _posed(rig, play, weights, camera):
+def posed_rig(rig, play, weights, camera):
     """The Rig in a pose, without targets; only the faces that can come into the picture."""
     half = camera.half_height * np.array([camera.size[1] / camera.size[0], 1.0]) + _AROUND_MM
     meshes = []
