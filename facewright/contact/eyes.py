@@ -19,6 +19,7 @@ from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
 _ROUNDS = 3
+_FULLNESS = 0.6
 _CORNER_MM = 2.0
 
 
@@ -139,8 +140,10 @@ class _Eye:
 
     def _turned_both(self, direction, ball):
         """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
+        # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
         upper, lower = (
-            np.radians(turn) * profile for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
+            np.radians(turn) * profile ** (1.0 / _FULLNESS)
+            for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
         )
         close_u, close_l = self._closing_turns()
         return self.lids.turned(self.V, upper + close_u, lower + close_l, ball, self.lids.slides(self.V))
@@ -222,4 +225,4 @@ def _ramp(chain):
 def _profile(chain):
     """(k,) 0 at the canthi, 1 over the middle of a margin."""
     steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
-    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** 0.6
+    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** _FULLNESS
