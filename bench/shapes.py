@@ -19,14 +19,15 @@ from cases import find_benchmark_template, fingerprint
 from common import CACHE, SCANS, peak_memory_mb, print_table
 
 from facewright.cli.evaluate import print_rows
+from facewright.contact import part_lips
 from facewright.data import Face
 from facewright.evaluate.bars import rig_rows
 from facewright.evaluate.rows import Row, worst_rows
 from facewright.evaluate.shapes import MIRROR_BAR_MM, mirror_mm
 from facewright.evaluate.synthetic import random_identity
 from facewright.packing import pack_face, unpack_face
-from facewright.parts import build_rig, fit_parts
-from facewright.pipeline import shapes_of
+from facewright.parts import fit_parts
+from facewright.pipeline import rig_from_face
 from facewright.read import read_scan
 from facewright.register import register
 from facewright.sample import sample_path
@@ -60,14 +61,13 @@ def registered(template, path, fresh):
 
 def rigged(face, seconds, parts_in_place=False):
     """The Rig of a Face, as the main job makes it; adds core seconds (the clock's, when nothing else runs)."""
-    if not parts_in_place:
-        face = fit_parts(face)
+    face = part_lips(face if parts_in_place else fit_parts(face))
     start = time.process_time()
     transfer_shapes(face)
     seconds["transfer"], start = time.process_time() - start, time.process_time()
-    targets = shapes_of(face)
+    rig = rig_from_face(face)
     seconds["contact"] = time.process_time() - start - seconds["transfer"]
-    return build_rig(face, targets.deltas, eyes=targets)
+    return rig
 
 
 def heads(template, count, only, fresh):

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from render import jpeg_bytes
 
+from facewright.contact import part_lips
 from facewright.data import Face
 from facewright.errors import InputError
 from facewright.evaluate.play import Player
@@ -39,7 +40,7 @@ def template_rig(name):
         return None
     seen, closed = np.ones(len(template.vertices), bool), {"left": False, "right": False}
     V = template.vertices
-    return rig_from_face(Face(template, V, V, template.regions, template.lines, seen, {}, closed, {}))
+    return rig_from_face(part_lips(Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})))
 
 
 def beside_each_other(rigs, where):

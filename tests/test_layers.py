@@ -17,7 +17,7 @@ ALLOWED = {
     "scan": BASE,
     "transfer": BASE,
     "register": BASE | {"scan", "transfer"},
-    "contact": BASE | {"transfer"},
+    "contact": BASE | {"transfer", "expand"},
     "parts": BASE | {"transfer"},
     "bake": BASE,
     "evaluate": BASE | {"expand"},

@@ -2,7 +2,7 @@
 
   facewright evaluate result/
   facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
-  facewright evaluate rig result/                 # all bars of the finished rig: eyes, shapes, random blends
+  facewright evaluate rig result/                 # all bars of the finished rig: eyes, mouth, shapes, blends
   facewright evaluate rig any.glb                 # the same of any GLB with named shapes, as far as it can be known
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
 
@@ -93,12 +93,10 @@ def _number(value):
 
 
 def _range(bar):
-    least, most = bar
-    return (
-        "-"
-        if bar == (None, None)
-        else f"{'' if least is None else f'{least:g}'}..{'' if most is None else f'{most:g}'}"
-    )
+    if bar == (None, None):
+        return "-"
+    least, most = ("" if end is None else f"{end:g}" for end in bar)
+    return f"{least}..{most}"
 
 
 def collect(folder, scan_file=None, shapes=False):

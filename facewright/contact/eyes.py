@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from facewright.contact.gaze import gaze_rotation, look_shapes, turned_ball
 from facewright.contact.lids import LidMotionOptions, Lids
+from facewright.contact.targets import Targets
 from facewright.conventions import corrective_name, in_between_name
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
@@ -41,19 +42,8 @@ class EyeShapeOptions:
     free_mm: float = 24.0
 
 
-@dataclass(frozen=True)
-class EyeShapes:
-    """deltas (s, n, 3) of the template's shapes, those of the eyes made anew; extras name -> (n, 3): in-betweens
-    "name@0.5" and correctives "a+b"; in_betweens and correctives as in data.Rig."""
-
-    deltas: np.ndarray
-    extras: dict[str, np.ndarray]
-    in_betweens: dict[str, dict[float, str]]
-    correctives: dict[str, tuple[str, ...]]
-
-
 def solve_eyes(face, deltas, options=None):
-    """EyeShapes of a Face with its parts in place and its transferred shapes deltas (s, n, 3) mm."""
+    """Targets of a Face with its parts in place from its transferred shapes (s, n, 3) mm; eye shapes made anew."""
     options = options or EyeShapeOptions()
     names = list(face.template.shape_names)
     result = np.array(deltas)
@@ -76,7 +66,7 @@ def solve_eyes(face, deltas, options=None):
             target = corrective_name(pair)
             extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
             correctives[target] = pair
-    return EyeShapes(result, extras, in_betweens, correctives)
+    return Targets(tuple(names), result, extras, in_betweens, correctives)
 
 
 class _Eye:

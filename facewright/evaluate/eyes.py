@@ -35,7 +35,7 @@ def diagonal_looks():
     return {" + ".join(pair): dict.fromkeys(pair, 1.0) for pair in pairs}
 
 
-def measure_eyes(rig):
+def measure_eyes(rig, views=True):
     """dict of figures of both eyes, the worse side each.
 
     radius_mm, lid_gap_mm  of the eyeball; largest distance of a margin from it at rest, the outer 15 % at either
@@ -47,7 +47,7 @@ def measure_eyes(rig):
     through_mm2  weight of eyeBlink -> largest area of the ball seen through lid skin, from the front and both sides
     turn_deg   look shape -> angle that the ball turns at 1
     swell, swell_diagonal  share by which the ball's radius changes on the way of the looks, and of the diagonal ones
-    Figures of poses are pairs: (with in-betweens and correctives, plain).
+    Figures of poses are pairs: (with in-betweens and correctives, plain). Without views nothing is looked at.
     """
     players = [Player(rig, full) for full in (True, False)]
     sides = [side for side in ("left", "right") if _has_eye(rig, side, players[0].names)]
@@ -62,10 +62,10 @@ def measure_eyes(rig):
         "swell": _worst(players, balls, lambda ball, play: max(ball.swell(play, way) for way in ways)),
         "swell_diagonal": _worst(players, balls, lambda ball, play: max(ball.swell(play, way) for way in diagonals)),
     }
-    return result | (_measure_lids(rig, sides, players) if "eyes" in rig.regions and rig.lines else {})
+    return result | (_measure_lids(rig, sides, players, views) if "eyes" in rig.regions and rig.lines else {})
 
 
-def _measure_lids(rig, sides, players):
+def _measure_lids(rig, sides, players, views):
     """The figures of measure_eyes that need the lids' lines and regions."""
     eyes = [_Eye(rig, side) for side in sides]
     poses = {}
@@ -74,18 +74,18 @@ def _measure_lids(rig, sides, players):
         if weights.get("eyeBlink", 0.0) == 1.0:
             poses[name]["margins_mm"] = _worst(players, eyes, lambda eye, play, w=weights: eye.margins(play, w))
     blink = {"eyeBlink": 1.0}
-    through = {}
-    for weight in BLINKS:
-        through[weight] = _worst(
-            players, eyes, lambda eye, play, w=weight: eye.seen_through_lids(play, {"eyeBlink": w})
-        )
-    return {
+    result = {
         "lid_gap_mm": max(eye.lid_gap() for eye in eyes),
         "poses": poses,
         "kink_deg": _worst(players, eyes, lambda eye, play: eye.kink(play, blink)),
-        "visible_mm2": _worst(players, eyes, lambda eye, play: eye.seen(play, blink)),
-        "through_mm2": through,
     }
+    if views:
+        result["visible_mm2"] = _worst(players, eyes, lambda eye, play: eye.seen(play, blink))
+        result["through_mm2"] = {
+            weight: _worst(players, eyes, lambda eye, play, w=weight: eye.seen_through_lids(play, {"eyeBlink": w}))
+            for weight in BLINKS
+        }
+    return result
 
 
 def _worst(players, eyes, measure):

@@ -49,6 +49,30 @@ class SmoothSpread:
         return field
 
 
+class SoftSpread:
+    """Displacements of least bending that follow wishes of some vertices, factored anew for each set of wishes.
+
+    Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free.
+    V (n, 3), F (m, 3), free (n,) bool; reach_mm: the field fades over this distance
+    """
+
+    def __init__(self, V, F, free, reach_mm=5.0):
+        self.free, self._n = np.flatnonzero(free), len(V)
+        self._energy = _bending(V, F, reach_mm)[self.free][:, self.free]
+
+    def __call__(self, wishes, weights, smooth_mm=1.0):
+        """(n, 3) field for wishes (n, 3) with weights (n,); a vertex of weight 0 wishes for nothing.
+
+        smooth_mm  width over which one vertex with w = 1 mm^2 is felt
+        """
+        w = weights[self.free]
+        field = np.zeros((self._n, 3))
+        field[self.free] = Factorization(smooth_mm**4 * self._energy + sp.diags(w)).solve(
+            w[:, None] * wishes[self.free]
+        )
+        return field
+
+
 def _bending(V, F, reach_mm):
     """(n, n) csr L M^-1 L + M / reach^4."""
     C = cotangent_laplacian(V, F).tocoo()

@@ -33,7 +33,7 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
 
     deltas  (s, n, 3) mm from face.vertices, in the order of face.template.shape_names
     maps    name -> (h, w, c) uint8 of the skin; "albedo" and "normal" go on its material, others are left to textures/
-    eyes    contact.EyeShapes whose in-betweens and correctives the rig shall have; deltas are then eyes.deltas
+    eyes    contact.Targets whose in-betweens and correctives the rig shall have; deltas are then eyes.deltas
     returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
     """
     options = options or AssemblyOptions()

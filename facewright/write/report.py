@@ -13,7 +13,6 @@ from facewright import __version__
 from facewright.evaluate.distances import measure_distances
 from facewright.evaluate.quality import measure_quality
 from facewright.evaluate.seam import measure_seam
-from facewright.evaluate.shapes import measure_shapes
 from facewright.evaluate.symmetry import measure_symmetry
 from facewright.write.files import replace_file
 
@@ -51,7 +50,6 @@ def build_report(scan, face, rig, clean_stats, pose_info):
         "symmetry_mm": measure_symmetry(face.vertices, face.template.mirror, face.regions),
         "T_rig_to_scan": rig.info["T_rig_to_scan"],
         "targets": len(rig.target_names),
-        "shapes": measure_shapes(rig),
         "warnings": warnings(scan, face, registration, clean_stats, pose_info),
     }
 
