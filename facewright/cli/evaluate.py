@@ -5,6 +5,7 @@
   facewright evaluate rig result/                 # all bars of the finished rig: eyes, mouth, shapes, blends
   facewright evaluate rig any.glb                 # the same of any GLB with named shapes, as far as it can be known
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+  facewright evaluate compression TEXTURES/ --neutral neutral.png --mesh neutral.obj --out figures/   # FaceZip
 
 Distances are in millimetres; docs/evaluate.md defines every figure.
 """
@@ -24,18 +25,31 @@ COLUMN_WIDTHS = (("full", 9), ("plain 52", 9), ("bar", 10), ("bar of 52", 10))
 
 def add_arguments(parser):
     """Arguments of `facewright evaluate`."""
-    parser.add_argument("result", nargs="+", metavar="[rig] FOLDER", help="a folder that `facewright rig` wrote")
+    parser.add_argument(
+        "result",
+        nargs="+",
+        metavar="[rig|compression] FOLDER",
+        help="a folder that `facewright rig` wrote, a GLB (rig), or textures (compression)",
+    )
     parser.add_argument(
         "--blends", type=int, default=1000, metavar="N", help="evaluate rig: random blends to try (default: 1000)"
     )
     parser.add_argument("--scan", metavar="FILE", help="the scan that the rig was made from")
     parser.add_argument("--shapes", action="store_true", help="measure every shape too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.add_argument("--neutral", metavar="IMAGE", help="compression: the neutral texture")
+    parser.add_argument("--mesh", metavar="OBJ", help="compression: the mesh with UVs that the textures belong to")
+    parser.add_argument("--out", metavar="FOLDER", help="compression: folder for tables, CSV and plots")
 
 
 def run(options):
     """Collect the figures and print them."""
     *what, folder = options.result
+    if what == ["compression"]:
+        from facewright.cli.evaluate_compression import evaluate
+
+        evaluate(folder, options)
+        return
     if what == ["rig"]:
         print_bars(Path(folder), options.blends, options.json)
         return

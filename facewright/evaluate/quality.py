@@ -14,7 +14,9 @@ from facewright.mesh.raster import Camera, RayScene
 
 SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
-RIM_MM = 2.0
+RIM_MM, LIP_RIM_MM = 2.0, 1.0
+FINE = 5  # rays along the side of a pixel that is looked at closely
+CANTHI = ("mp133", "mp33", "mp362", "mp263")
 
 
 def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
@@ -84,13 +86,22 @@ def visible_interior_mm2(vertices, faces, interior, center, *, width_mm=80.0, mm
     """Largest area of interior faces that is seen through the lips from one of the views, mm2 in the picture plane.
 
     interior (m,) bool: faces of the mouth bag, teeth and tongue; center (3,) the middle of the mouth
+    A pixel counts if most of it shows the inside: lips that touch leave a slit of a few hundredths of a millimetre,
+    through which single rays pass and which no picture shows.
     """
     scene, pixels = RayScene(vertices, faces), round(width_mm / mm_per_px)
+    shifts = (np.arange(FINE) + 0.5) / FINE - 0.5
     most = 0.0
     for yaw, pitch in views:
         camera = Camera.looking_at(center, yaw, pitch, width_mm / 2, (pixels, pixels))
-        face = scene.cast(*camera.rays()).face
-        most = max(most, float(interior[face[face >= 0]].sum()) * mm_per_px**2)
+        origins, directions = camera.rays()
+        face = scene.cast(origins, directions).face
+        suspects = np.flatnonzero((face >= 0) & interior[face])
+        x, y = (shifts * mm_per_px)[:, None, None] * camera.R[0], (shifts * mm_per_px)[None, :, None] * camera.R[1]
+        fine = (origins[suspects, None, None] + x + y).reshape(-1, 3)
+        face = scene.cast(fine, np.repeat(directions[suspects], FINE**2, axis=0)).face
+        inside = ((face >= 0) & interior[face]).reshape(-1, FINE**2).mean(axis=1) > 0.5
+        most = max(most, float(inside.sum()) * mm_per_px**2)
     return most
 
 
@@ -104,19 +115,32 @@ def region_faces(mask, faces):
     return mask[faces].all(axis=1)
 
 
-def lid_rim_faces(vertices, faces, lines, rim_mm=RIM_MM):
-    """(m,) bool: faces within rim_mm of a lid margin: the thickness of the lids, which belongs to the eye opening."""
-    margins = np.concatenate([vertices[line] for name, line in lines.items() if name.startswith("lid_")])
-    return cKDTree(margins).query(vertices[faces].mean(axis=1))[0] < rim_mm
+def lid_rim_faces(vertices, faces, lines, canthi=(), rim_mm=RIM_MM):
+    """(m,) bool: faces within rim_mm of a lid margin: the thickness of the lids, which belongs to the eye opening.
+
+    canthi (c, 3): where lids meet; between a margin's end and the canthus before it, the groove is part of the opening
+    """
+    margins = [vertices[line] for name, line in lines.items() if name.startswith("lid_")]
+    ends = np.array([end for margin in margins for end in margin[[0, -1]]])
+    for canthus in canthi:
+        end = ends[np.linalg.norm(ends - canthus, axis=1).argmin()]
+        margins.append(np.linspace(end, canthus, 9))
+    return cKDTree(np.concatenate(margins)).query(vertices[faces].mean(axis=1))[0] < rim_mm
+
+
+def lip_rim_faces(vertices, faces, lines, rim_mm=LIP_RIM_MM):
+    """(m,) bool: faces within rim_mm of the lips' line of contact, where they turn inward."""
+    seam = np.concatenate([vertices[lines[name]] for name in ("lip_seam_upper", "lip_seam_lower")])
+    return cKDTree(seam).query(vertices[faces].mean(axis=1))[0] < rim_mm
 
 
 def measure_quality(scan, fit, template, regions=None, lines=None):
     """Soundness of a fit, as report.json has it under `registration`.
 
     scan a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template
-    returns dict folded, folded_lid_rims (apart: a scan shows a bump or the other lid where the template has the lid's
-    thickness, so its normal there says nothing), self_intersections (pairs with a face in region `face` that the
-    neutral has not), lip_gap_mm (largest), visible_mouth_mm2
+    returns dict folded, folded_lid_rims and folded_lip_rims (apart: a scan shows a bump or the other lid or lip where
+    the template has its thickness, so its normal there says nothing), self_intersections (pairs with a face in region
+    `face` that the neutral has not), lip_gap_mm (largest), visible_mouth_mm2
     """
     regions = template.regions if regions is None else regions
     lines = template.lines if lines is None else lines
@@ -125,7 +149,9 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     skin = np.zeros(len(faces), bool)
     skin[template.skin.face_slice] = True
     folded = folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)
-    rim = lid_rim_faces(fit, faces, lines)
+    known = [i for i, name in enumerate(template.landmarks.names) if name in CANTHI]
+    rim = lid_rim_faces(fit, faces, lines, template.landmarks.positions(fit, faces)[known])
+    lip_rim = lip_rim_faces(fit, faces, lines) & ~rim
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)
     inside = region_faces(regions["mouth_interior"], faces)
@@ -133,8 +159,9 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
         if part.name in ("teeth_upper", "teeth_lower", "tongue"):
             inside[part.face_slice] = True
     return {
-        "folded": int((~rim[folded]).sum()),
+        "folded": int((~(rim | lip_rim)[folded]).sum()),
         "folded_lid_rims": int(rim[folded].sum()),
+        "folded_lip_rims": int(lip_rim[folded].sum()),
         "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),
         "lip_gap_mm": float(gaps.max()),
         "visible_mouth_mm2": visible_interior_mm2(fit, faces, inside, middle),

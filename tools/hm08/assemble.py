@@ -19,7 +19,9 @@ from hm08.control import build_control
 from hm08.head import build_head
 from hm08.parts import eye_pair, simple_part
 from hm08.regions import EAR_TARGETS, skin_regions
-from hm08.shapes import build_shapes, eye_turn, rigid_motion
+from hm08.shapes import build_shapes
+from hm08.shapes.eyes import eye_turn
+from hm08.shapes.jaw import rigid_motion
 from hm08.skeleton import build_skeleton, hinge_of, skin_weights
 from hm08.source import read_base, read_face_units, read_macros, read_modifiers
 from hm08.uv import build_atlas, unwrap_part
@@ -106,8 +108,10 @@ def build_asset(source, *, say=lambda text: None):
     assembly = _assemble(control, head, uv, uv_polygons)
     say("shapes")
     raw = read_face_units(source, n_base, ARKIT_SHAPES)[:, control.original] * control.scale
-    skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions)
-    skin_deltas, jaw = _with_parts(skin_deltas, raw, control, head, assembly)
+    turns = {name: _jaw_motion(name, raw, control) for name in JAW_SHAPES}
+    jaw = turns["jawOpen"]
+    skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions, jaw)
+    skin_deltas = _with_parts(skin_deltas, raw, turns, control, head, assembly)
     say("identity")
     names, fields = _carried(names, deltas, macros, control, head)
     operator = _operator(control, head, assembly)
@@ -141,23 +145,25 @@ def _assemble(control, head, uv, uv_polygons):
     return assembly
 
 
-def _with_parts(skin, raw, control, head, assembly):
-    """(52, n, 3) deltas of all parts, and the jaw's rigid motion (R, t) in jawOpen."""
+def _jaw_motion(name, raw, control):
+    """R, t: the rigid motion of the lower teeth in a jaw shape, symmetric where the shape is."""
+    index = simple_part(control, "teeth_lower")[3]
+    teeth = control.vertices[index]
+    own = raw[ARKIT_SHAPES.index(name)][index]
+    other = raw[ARKIT_SHAPES.index(mirrored_name(name))][control.mirror[index]] * [-1, 1, 1]
+    return rigid_motion(teeth, teeth + 0.5 * (own + other))
+
+
+def _with_parts(skin, raw, turns, control, head, assembly):
+    """(52, n, 3) deltas of all parts; turns: jaw shape -> (R, t)."""
     n = sum(len(v) for v in assembly.vertices)
     deltas = np.zeros((len(ARKIT_SHAPES), n, 3))
     deltas[:, : skin.shape[1]] = skin
     part = {p.name: p.vertex_slice for p in assembly.parts}
     index = {name: simple_part(control, name)[3] for name in ATTACH}
     teeth, tongue = control.vertices[index["teeth_lower"]], control.vertices[index["tongue"]]
-    jaw = None
-    for name in JAW_SHAPES:
+    for name, (R, t) in turns.items():
         i = ARKIT_SHAPES.index(name)
-        flip = np.array([-1.0, 1.0, 1.0])
-        own = raw[i][index["teeth_lower"]]
-        other = raw[ARKIT_SHAPES.index(mirrored_name(name))][control.mirror[index["teeth_lower"]]] * flip
-        R, t = rigid_motion(teeth, teeth + 0.5 * (own + other))
-        if name == "jawOpen":
-            jaw = (R, t)
         deltas[i, part["teeth_lower"]] = teeth @ R.T + t - teeth
         deltas[i, part["tongue"]] = tongue @ R.T + t - tongue
     i = ARKIT_SHAPES.index("tongueOut")
@@ -170,7 +176,7 @@ def _with_parts(skin, raw, control, head, assembly):
             center = head.eye_center * ([1, 1, 1] if side == "eye_left" else [-1, 1, 1])
             vertices = assembly.vertices[[p.name for p in assembly.parts].index(side)]
             deltas[i, part[side]] = eye_turn(name, vertices, center)
-    return deltas, jaw
+    return deltas
 
 
 def _carried(names, deltas, macros, control, head):
