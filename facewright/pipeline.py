@@ -167,7 +167,7 @@ def _run_job(run, path, output, options, inputs, template, folder):
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, face, template)
-    shapes, figures = _transfer(run, face, template)
+    shapes, figures = _transfer(run, face, template, options.jobs)
     maps = _bake(run, scan, face, options)
     report = _write(run, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
@@ -231,19 +231,19 @@ def _parts(run, face, template):
     return unpack_face(arrays, info, template)
 
 
-def shapes_of(face):
+def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
-    return solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))))
+    return solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))), jobs=jobs)
 
 
-def rig_from_face(face, maps=None):
+def rig_from_face(face, maps=None, jobs=1):
     """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
-    return _assembled(face, shapes_of(face), maps)
+    return _assembled(face, shapes_of(face, jobs), maps)
 
 
-def _transfer(run, face, template):
+def _transfer(run, face, template, jobs):
     def work():
-        targets = shapes_of(face)
+        targets = shapes_of(face, jobs)
         bare = _assembled(face, targets, options=AssemblyOptions(eyes=None))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.

@@ -54,10 +54,11 @@ class LipContact:
 
     vertices (n, 3) mm the neutral of the whole head; faces (m, 3) of its skin, the same on both sides (even_handed)
     seams    upper and lower line, paired, with shared ends
+    outer    (n,) bool: skin that is seen
     teeth    sequence of slices of the rows of teeth among the vertices, with their faces (from 0): (slice, faces)
     """
 
-    def __init__(self, vertices, faces, seams, teeth=(), options=None):
+    def __init__(self, vertices, faces, seams, outer, teeth=(), options=None):
         self.options = options or LipOptions()
         self.V = vertices
         seam = np.unique(np.concatenate(seams))
@@ -74,6 +75,8 @@ class LipContact:
         self._pairs = [place[line[1:-1]] for line in seams]
         self._both = np.concatenate(self.sides)
         self.lips = self.used[self._both]
+        # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
+        self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
         free = ~border_vertices(self.faces, len(rest))
         self.spread = SoftSpread(rest, self.faces, free, self.options.reach_mm)
@@ -81,14 +84,14 @@ class LipContact:
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
         self.teeth = [(at, Teeth(vertices[at], own)) for at, own in teeth]
-        in_teeth = [np.linalg.norm(row.way_out(rest[self._both], vertices[at]), axis=1) for at, row in self.teeth]
+        in_teeth = [np.linalg.norm(row.way_out(rest[self._guarded], vertices[at]), axis=1) for at, row in self.teeth]
         self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
 
-    def apart(self, motion, weights=None, power=1, closed=False):
+    def apart(self, motion, weights=None, acts=None, closed=False):
         """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
 
-        motion   function of a weight: displacement (n, 3) of the head from the neutral; a correction c acts on it as
-                 weight**power * c
+        motion   function of a weight: displacement (n, 3) of the head from the neutral
+        acts     function of a weight: how strongly the correction acts there; default: as the weight
         weights  at which contact is solved; default: options.weights
         closed   the lips shall meet: pairs of the seam stay together while the rest moves apart, locally
         """
@@ -99,7 +102,7 @@ class LipContact:
         for width in _LOCAL_MM if closed else self.options.smooth_mm:
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
             for weight in asked:
-                share = weight**power
+                share = acts(weight) if acts else weight
                 skin = poses[weight][self.used] + share * field
                 wishes, heeded = self._wishes(skin, poses[weight])
                 if closed:
@@ -127,11 +130,11 @@ class LipContact:
         skin = np.ascontiguousarray(skin)
         wishes, counts = self._lip_wishes(skin)
         for (at, row), allowed in zip(self.teeth, self._in_teeth):
-            way = row.way_out(skin[self._both], pose[at])
+            way = row.way_out(skin[self._guarded], pose[at])
             depth = np.linalg.norm(way, axis=1)
             hit = depth > allowed + self.options.touch_mm
-            wishes[self._both[hit]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
-            counts[self._both[hit]] = 1.0
+            wishes[self._guarded[hit]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            counts[self._guarded[hit]] = 1.0
         return wishes, np.minimum(counts, 1.0)
 
     def _add_closing(self, skin, wishes, counts):

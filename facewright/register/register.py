@@ -140,7 +140,7 @@ def _fit_model(template, target, pairs, closed, options):
 def _without_knots(template, skin, faces):
     """Skin (n, 3) with the knots of lips and lids smoothed away.
 
-    The lip seam and the skin beside them hold; only where a knot does not come loose, what lies around it gives way too.
+    The lip seam and the skin beside them hold; where a knot does not come loose, what lies around it gives way too.
     """
     n = len(skin)
     knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
