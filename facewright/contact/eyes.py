@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from facewright.contact.gaze import gaze_rotation, look_shapes, turned_ball
@@ -21,6 +22,7 @@ from facewright.transfer.eyeball import carried_eyeball, eye_parts
 HALF = 0.5
 _ROUNDS = 3
 _FULLNESS = 0.6
+_CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
 _CORNER_MM = 2.0
 
 
@@ -85,7 +87,10 @@ class _Eye:
         socket = face.regions[f"socket_{side}"][self.skin]
         held = face.regions["mouth_interior"][self.skin] | face.regions["nostrils"][self.skin]
         margin = self.V[np.concatenate([upper, lower])]
-        distance = np.linalg.norm(self.V[:, None] - margin[None, ::3], axis=2).min(axis=1)
+        distance = cKDTree(margin).query(self.V)[0]
+        # A template's own squint may reach far down the cheek, which is cheekSquint's.
+        place = np.clip((_CHEEK_MM[1] - distance) / (_CHEEK_MM[1] - _CHEEK_MM[0]), 0.0, 1.0)
+        self.squints = (place * place * (3.0 - 2.0 * place))[:, None]
         free = (distance < options.free_mm) & ~held & ~(socket & (distance > 0.5 * options.free_mm))
         self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
         self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
@@ -174,7 +179,7 @@ class _Eye:
 
     def _squint(self, own):
         open_u, open_l = self.lids.opening(self.V)
-        pose = self.V + own
+        pose = self.V + self.squints * own
         upper, lower = self.lids.upper, self.lids.lower
         wanted_u = self.lids.angles(self.V[upper]) - self.options.squint_share[0] * open_u
         wanted_l = self.lids.angles(self.V[lower]) + self.options.squint_share[1] * open_l
