@@ -53,37 +53,12 @@ def _near_box(vertices, faces, points, margin_mm=5.0):
     return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
 
 
-def folded_by_shape(neutral, moved, faces, mask=None):
-    """Indices of faces turned by more than 90 degrees against the neutral after the best rotation around them.
+def torn_edges(neutral, moved, faces, mask=None, *, edges=None, grow_mm=4.0, factor=3.0):
+    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices.
 
-    neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
-    fitted to the corners of all faces that share a vertex with it (Kabsch).
+    edges  unique_edges(faces), if they are known already
     """
-    covariance = _vertex_covariance(neutral, moved, faces)
-    around = covariance[faces].sum(axis=1)  # (m, 3, 3)
-    U, _, Vt = np.linalg.svd(around)
-    flip = np.linalg.det(U @ Vt) < 0
-    U[flip, :, 2] *= -1
-    expected = np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces))
-    folded = (expected * face_normals(moved, faces)).sum(axis=1) < 0
-    return np.flatnonzero(folded if mask is None else folded & mask)
-
-
-def _vertex_covariance(neutral, moved, faces):
-    """(n, 3, 3) sums over the faces at a vertex of (rest edge)(moved edge)^T."""
-    total = np.zeros((len(neutral), 3, 3))
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        rest = neutral[faces[:, b]] - neutral[faces[:, a]]
-        now = moved[faces[:, b]] - moved[faces[:, a]]
-        outer = rest[:, :, None] * now[:, None, :]
-        for corner in range(3):
-            np.add.at(total, faces[:, corner], outer)
-    return total
-
-
-def torn_edges(neutral, moved, faces, mask=None, *, grow_mm=4.0, factor=3.0):
-    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices."""
-    edges = unique_edges(faces)
+    edges = unique_edges(faces) if edges is None else edges
     if mask is not None:
         edges = edges[mask[edges].all(axis=1)]
     rest = np.linalg.norm(neutral[edges[:, 0]] - neutral[edges[:, 1]], axis=1)
