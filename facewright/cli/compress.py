@@ -127,20 +127,18 @@ def parse_size(text):
 
 def write_previews(packed, folder, reader, names, examples):
     """preview.html of the first map, preview_NAME.html of the others; returns sentences on what is left out."""
-    import numpy as np
-
     from facewright.compress.folder import cannot_write
     from facewright.compress.preview import preview_missing, preview_page
     from facewright.write.files import file_name
 
     notes = []
-    mix = None if examples is None else np.linalg.pinv(examples[1])
+    B = None if examples is None else examples[1]
     for number, (name, one) in enumerate(packed.items()):
         missing = preview_missing(one)
         if missing:
             notes.append(missing)
             continue
-        page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", mix=mix)
+        page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", examples=B)
         try:
             (folder / ("preview.html" if number == 0 else f"preview_{file_name(name)}.html")).write_text(
                 page, encoding="utf-8"
