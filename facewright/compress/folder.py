@@ -29,16 +29,17 @@ LARGEST_SIDE = 16384
 PNG_LEVEL = 1
 
 
-def write_packed(packed, folder, ktx2=None):
+def write_packed(packed, folder, ktx2=None, progress=None):
     """Write a Packed, or a dict name -> Packed of several maps, into an existing folder.
 
     ktx2     "bc7", "astc" or None: block-compressed images beside the PNG
+    progress function (stage, share done)
     returns  facezip.json as a dict
     """
     folder = Path(folder)
     maps = packed if isinstance(packed, dict) else {"color": packed}
     about = {"format": FORMAT, **_shared(next(iter(maps.values())))}
-    store, first = _Store(folder, ktx2), None
+    store, first = _Store(folder, ktx2, sum(len(one.textures) + 2 for one in maps.values()), progress), None
     about["maps"] = {}
     for number, (name, one) in enumerate(maps.items()):
         prefix = "" if number == 0 else file_name(name) + "_"
@@ -128,8 +129,9 @@ def weight_atlas(packed, start=0):
 class _Store:
     """Writes the files of a folder and adds up their bytes."""
 
-    def __init__(self, folder, ktx2):
-        self.folder, self.ktx2 = folder, ktx2
+    def __init__(self, folder, ktx2, count, progress):
+        self.folder, self.ktx2, self.count, self.progress = folder, ktx2, count, progress
+        self.done = 0
         self.bytes = {"png": 0, "ktx2": 0, "memory": 0, "memory_ktx2": 0}
         self.waiting = {}
 
@@ -143,6 +145,9 @@ class _Store:
         self._write(f"{name}.ktx2", data)
         self.bytes["ktx2"] += len(data)
         self.bytes["memory_ktx2"] += on_card
+        self.done += 1
+        if self.progress is not None:
+            self.progress("writing KTX2", min(self.done / self.count, 1.0))
         return {"file": f"{name}.png", "ktx2": f"{name}.ktx2", "ktx2_bytes": len(data), "ktx2_memory": on_card}
 
     def flush(self):
