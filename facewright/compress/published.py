@@ -13,7 +13,7 @@ from itertools import permutations
 import numpy as np
 
 from facewright.compress.masks import build_masks
-from facewright.compress.refine import Pass, gram_matrix
+from facewright.compress.refine import Pass
 from facewright.compress.store import measure_tiles, quantise_textures, quantise_weights, root_mean, stored_parts
 from facewright.compress.threads import in_threads
 from facewright.compress.tiles import TEXELS
@@ -23,19 +23,27 @@ MOST_BLOCKS = 64
 MASK_CHOICES = (13, 33, 53, 83)
 
 
-def coarse_grams(tiles, grams, masks):
-    """Grams and mask values on at most 64 x 64 blocks: (b, N, N) float32 and (b, k)."""
+def coarse_grams(tiles, masks):
+    """Grams and mask values on at most 64 x 64 blocks of tiles: (b, N, N) float32 and (b, k)."""
     rows, columns = tiles.grid.tiles
     corner = masks.reshape(-1, masks.shape[2])[tiles.grid.corner_cells()].mean(axis=1)
+    corner = corner.reshape(rows, columns, -1)
     step = max(1, -(-max(rows, columns) // MOST_BLOCKS))
-    by, bx = np.arange(rows) // step, np.arange(columns) // step
-    block = (by[:, None] * (bx[-1] + 1) + bx[None]).ravel()
-    order = np.argsort(block, kind="stable")
-    starts = np.flatnonzero(np.diff(block[order], prepend=-1))
-    sums = np.add.reduceat(grams[order], starts, axis=0)
-    counts = np.diff(np.append(starts, len(block)))
-    means = np.add.reduceat(corner[order], starts, axis=0) / counts[:, None]
-    return sums, means.astype(np.float32)
+    starts = np.arange(0, columns, step)
+
+    def one(top):
+        """The blocks of some rows of tiles: no two calls add to the same block, so the sums come out the same."""
+        below = min(top + step, rows)
+        grams = np.zeros((len(starts), tiles.count, tiles.count), np.float32)
+        for row in range(top, below):
+            x = tiles.differences(slice(row * columns, (row + 1) * columns))
+            grams += np.add.reduceat(x @ x.transpose(0, 2, 1), starts, axis=0)
+        values = np.add.reduceat(corner[top:below].sum(axis=0), starts, axis=0)
+        counts = (below - top) * np.diff(np.append(starts, columns))
+        return grams, (values / counts[:, None]).astype(np.float32)
+
+    grams, values = zip(*in_threads(one, range(0, rows, step)))
+    return np.concatenate(grams), np.concatenate(values)
 
 
 def cluster_fragments(grams, k, *, restarts=20, iterations=30, seed=0, progress=None):
@@ -231,8 +239,7 @@ def _encode_published(tiles, k, options, mesh, region, progress):
 
 def published_search(tiles, masks, k, seed=0, progress=None):
     """PermutationSearch of a set under masks (rows, columns, m), the labels and the centroids."""
-    _, grams = gram_matrix(tiles, blocks=True)
-    blocks, values = coarse_grams(tiles, grams, masks)
+    blocks, values = coarse_grams(tiles, masks)
     per_mask = np.tensordot(values.T**2, blocks, 1)
     labels = cluster_fragments(per_mask, k, seed=seed, progress=progress and partial(progress, "clustering"))
     centroids = centroid_matrix(labels, k)
