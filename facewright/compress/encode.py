@@ -127,8 +127,8 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
     scale = _texel_scale(next(iter(neutrals.values())), mesh, covered, priority)
     stack = _stacked(list(neutrals.values()))
     levels = [np.iinfo(image.dtype).max for image in neutrals.values() for _ in range(image.shape[2])]
-    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as path:
-        tiles = TextureTiles(stack, len(names), scale, path, levels)
+    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as scratch:
+        tiles = TextureTiles(stack, len(names), scale, scratch, levels)
         layers = _read(tiles, maps, neutrals, names, clock, progress)
         if len(maps) > 1:
             with clock.stage("solving"):
