@@ -36,6 +36,7 @@ def test_one_texture_compresses_to_itself(channels, dtype):
     packed = facezip(neutral, images)
     step = packed.texture_step.max() / packed.unit
     assert np.abs(facezip_decode(packed, [1.0]).astype(int) - images[0]).max() <= 0.5 * step + 1
+    assert len(packed.textures) == 1
 
 
 def test_as_many_textures_as_expressions_reproduce_them():
