@@ -98,7 +98,7 @@ def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest
     if options.budget is not None:
         images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
         k = textures_within(options.budget, images, len(names), options.textures)
-        options = replace(options, textures=k, budget=None)
+        options = replace(options, textures=k)
     if len(maps) == 1 or share is False:
         return {
             name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
