@@ -43,7 +43,7 @@ class LipOptions:
     near_mm: float = 20.0
     smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8, 0.8, 0.8)
     reach_mm: float = 4.0
-    touch_mm: float = 0.12
+    touch_mm: float = 0.15
     gap_mm: float = 0.05
     teeth_mm: float = 0.1
     weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
