@@ -61,8 +61,8 @@ class JobOptions:
     eyes          "template": closed lids are opened to the template's aperture; "as-scanned": left as they are
     landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
     formats       what to write: glb, obj
-    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": in-betweens ("name@0.5")
-                  and pair correctives ("a+b") too. rig/ always has all of them
+    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": left and right halves in
+                  place of their sums, in-betweens ("name@0.5") and pair correctives ("a+b"). rig/ always has all
     jobs          threads inside the job; the result does not depend on it
     from_stage    run this stage and all after it again, whatever is cached
     """
@@ -231,10 +231,19 @@ def _parts(run, face, template):
     return unpack_face(arrays, info, template)
 
 
+def shapes_of(face, jobs=1):
+    """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
+    return solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))), jobs=jobs)
+
+
+def rig_from_face(face, maps=None, jobs=1):
+    """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
+    return _assembled(face, shapes_of(face, jobs), maps)
+
+
 def _transfer(run, face, template, jobs):
     def work():
-        targets = solve_eyes(face, hold_neck(face, transfer_shapes(face)))
-        targets = solve_mouth(face, targets, jobs=jobs)
+        targets = shapes_of(face, jobs)
         bare = _assembled(face, targets, options=AssemblyOptions(eyes=None))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
@@ -277,7 +286,7 @@ def _write(run, scan, face, shapes, figures, maps, found, output, options):
     def work():
         rig = _assembled(face, shapes, maps)
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
-        carried = rig if options.shapes == "full" else rig.plain()
+        carried = rig.full() if options.shapes == "full" else rig.plain()
         report = plain(build_report(scan, face, carried, *found) | figures)
         earlier = run.store.last_info("07-write").get("files", {})
         with output.workshop() as folder:
@@ -293,7 +302,7 @@ def _write(run, scan, face, shapes, figures, maps, found, output, options):
 def write_results(rig, maps, scan, face, folder, options):
     """Every file of a result but report.json and stages/."""
     plain_rig = rig.plain()
-    carried = rig if options.shapes == "full" else plain_rig
+    carried = rig.full() if options.shapes == "full" else plain_rig
     if "glb" in options.formats:
         write_gltf(carried, folder / "rig.glb")
     if "obj" in options.formats:
@@ -301,7 +310,7 @@ def write_results(rig, maps, scan, face, folder, options):
     write_credits(rig, folder / "CREDITS.txt")
     write_rig(rig, folder / "rig")
     write_textures(maps, folder / "textures", describe_maps(face, maps))
-    write_preview(plain_rig, scan, face, folder / "preview.png", options.jobs)
+    write_preview(rig, scan, face, folder / "preview.png", options.jobs)
 
 
 def _rig_to_scan(scan):

@@ -2,8 +2,10 @@
 
   facewright evaluate result/
   facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
-  facewright evaluate rig result/                 # bars of the finished rig: eyes, lips, teeth, jaw
+  facewright evaluate rig result/                 # all bars of the finished rig: eyes, mouth, shapes, blends
+  facewright evaluate rig any.glb                 # the same of any GLB with named shapes, as far as it can be known
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+  facewright evaluate compression TEXTURES/ --neutral neutral.png --mesh neutral.obj --out figures/   # FaceZip
 
 Distances are in millimetres; docs/evaluate.md defines every figure.
 """
@@ -11,27 +13,45 @@ Distances are in millimetres; docs/evaluate.md defines every figure.
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 from facewright.errors import InputError
 
 HELP = "print the figures of a finished job"
 COLUMNS = ("mean", "rms", "p95", "max", "left_out")
+COLUMN_WIDTHS = (("full", 9), ("plain 52", 9), ("bar", 10), ("bar of 52", 10))
 
 
 def add_arguments(parser):
     """Arguments of `facewright evaluate`."""
-    parser.add_argument("result", nargs="+", metavar="[rig] FOLDER", help="a folder that `facewright rig` wrote")
+    parser.add_argument(
+        "result",
+        nargs="+",
+        metavar="[rig|compression] FOLDER",
+        help="a folder that `facewright rig` wrote, a GLB (rig), or textures (compression)",
+    )
+    parser.add_argument(
+        "--blends", type=int, default=1000, metavar="N", help="evaluate rig: random blends to try (default: 1000)"
+    )
     parser.add_argument("--scan", metavar="FILE", help="the scan that the rig was made from")
     parser.add_argument("--shapes", action="store_true", help="measure every shape too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.add_argument("--neutral", metavar="IMAGE", help="compression: the neutral texture")
+    parser.add_argument("--mesh", metavar="OBJ", help="compression: the mesh with UVs that the textures belong to")
+    parser.add_argument("--out", metavar="FOLDER", help="compression: folder for tables, CSV and plots")
 
 
 def run(options):
     """Collect the figures and print them."""
     *what, folder = options.result
+    if what == ["compression"]:
+        from facewright.cli.evaluate_compression import evaluate
+
+        evaluate(folder, options)
+        return
     if what == ["rig"]:
-        print_rig(Path(folder), options.json)
+        print_bars(Path(folder), options.blends, options.json)
         return
     if what:
         raise InputError(f"evaluate: one folder at a time, got {len(options.result)}; or: evaluate rig FOLDER")
@@ -52,62 +72,51 @@ def run(options):
         print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
 
 
-def print_rig(folder, as_json):
-    """The bars of lids, eyeballs, lips, teeth and jaw: with in-betweens and correctives, and the plain 52 beside."""
-    from facewright.evaluate import eyes, mouth
-    from facewright.evaluate.rig import measure_jaw
+def print_bars(path, blends, as_json):
+    """Every bar of a rig: with in-betweens and correctives, and the plain 52 beside it."""
+    from facewright.evaluate.bars import rig_rows
+    from facewright.read.gltf_rig import read_gltf_rig
     from facewright.write.rig import read_rig
 
-    rig = read_rig(folder / "rig")
-    figures = {"eyes": eyes.measure_eyes(rig), "mouth": mouth.measure_mouth(rig), "jaw": measure_jaw(rig)}
+    rig = read_gltf_rig(path) if path.is_file() else read_rig(path / "rig")
+    rows = rig_rows(rig, blends)
     if as_json:
-        print(json.dumps(figures, indent=1))
+        print(json.dumps([asdict(row) | {"met": row.met} for row in rows], indent=1))
         return
-    of_eyes, of_mouth, jaw = figures.values()
-    print(
-        f"eyeball radius {of_eyes['radius_mm']:.2f} mm (11.5 to 12.5), lid gap at rest {of_eyes['lid_gap_mm']:.2f} mm "
-        f"(0.3), lip gap at rest {of_mouth['lip_gap_mm']:.2f} mm (0.3)"
-    )
-    print(
-        f"upper teeth move by {of_mouth['upper_teeth_moved_mm']:.2f} mm (0), the neck ring by "
-        f"{of_mouth['neck_moved_mm']:.2f} mm (0)"
-    )
-    if jaw is not None:
-        print(
-            f"jawOpen and jaw bone differ by: teeth {jaw['teeth_mm']:.3f} mm, skin {jaw['skin_mean_mm']:.1f} mm mean, "
-            f"{jaw['skin_p95_mm']:.1f} p95; hinge {jaw['before_ear_mm']:.0f} mm before the ear"
-        )
-    print("  ".join(["pose".ljust(34), "figure".ljust(11), "bar".rjust(5), "full".rjust(6), "plain".rjust(6)]))
-    print_bars(of_eyes["poses"], {"depth_mm": eyes.DEPTH_BAR_MM, "margins_mm": eyes.GAP_BAR_MM})
-    closed = {"jawOpen + mouthClose": {"gap_mm": of_mouth.get("mouth_close_gap_mm", ())}}
-    print_bars(closed, {"gap_mm": mouth.CLOSE_BAR_MM})
-    print_bars(worst_on_the_way(of_mouth["poses"]), mouth.BARS_MM)
+    if not rig.regions:
+        print("no regions or feature lines in this file: folds and tears count the inside of the mouth too")
+    print_rows(rows)
 
 
-def worst_on_the_way(poses):
-    """Poses of one shape ("mouthSmile 0.5") as one, with the worst figure at any weight."""
-    result = {}
-    for pose, figures in poses.items():
-        name, _, weight = pose.rpartition(" ")
-        known = result.setdefault(name if weight.replace(".", "").isdigit() else pose, {})
-        for key, values in figures.items():
-            known[key] = tuple(map(max, zip(known.get(key, values), values)))
-    return result
+def print_rows(rows):
+    """A table of evaluate.rows.Row, and how many bars are met."""
+    wide = [max((len(getattr(row, name)) for row in rows), default=0) for name in ("group", "pose", "figure")]
+    head = ("group".ljust(wide[0]), "pose".ljust(wide[1]), "figure".ljust(wide[2]))
+    print("  ".join([*head, *(text.rjust(width) for text, width in COLUMN_WIDTHS)]))
+    for row in rows:
+        names = (row.group.ljust(wide[0]), row.pose.ljust(wide[1]), row.figure.ljust(wide[2]))
+        values = (_number(row.full), _number(row.plain), _range(row.bar), _range(row.plain_bar))
+        cells = [text.rjust(width) for text, (_, width) in zip(values, COLUMN_WIDTHS)]
+        print("  ".join([*names, *cells, "" if row.met else "missed"]).rstrip())
+    judged = [row for row in rows if row.has_bar]
+    print(f"{sum(row.met for row in judged)} of {len(judged)} bars met")
 
 
-def print_bars(poses, bars):
-    """A line for each figure of each pose that has a bar; what misses it is marked."""
-    for pose, figures in poses.items():
-        for key, bar in bars.items():
-            if figures.get(key):
-                full, plain = figures[key]
-                verdict = "" if full <= bar else "  missed"
-                print(f"{pose.ljust(34)}  {key.ljust(11)}  {bar:5.2f}  {full:6.2f}  {plain:6.2f}{verdict}")
+def _number(value):
+    return "-" if value is None else str(value) if isinstance(value, int) else f"{value:.3f}"
+
+
+def _range(bar):
+    if bar == (None, None):
+        return "-"
+    least, most = ("" if end is None else f"{end:g}" for end in bar)
+    return f"{least}..{most}"
 
 
 def collect(folder, scan_file=None, shapes=False):
     """dict: report, neutral, and if asked rig_to_scan and shapes."""
-    from facewright.evaluate.rig import measure_neutral, measure_rig_distances, measure_shapes
+    from facewright.evaluate.rig import measure_neutral, measure_rig_distances
+    from facewright.evaluate.shapes import measure_shapes
     from facewright.write.rig import read_rig
 
     rig = read_rig(folder / "rig")

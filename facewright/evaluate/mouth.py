@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.evaluate.quality import lip_gaps_mm
+from facewright.evaluate.rows import Row
 from facewright.expand import expand_weights
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
@@ -16,6 +17,8 @@ from facewright.mesh.seam import seam_sides
 WEIGHTS = (0.25, 0.5, 0.75, 1.0)
 CROSSING_BAR_MM, TEETH_BAR_MM, CLOSE_BAR_MM = 0.3, 0.3, 0.5
 BARS_MM = {"crossing_mm": CROSSING_BAR_MM, "teeth_mm": TEETH_BAR_MM, "through_mm": 0.0}
+FIGURES = {"crossing_mm": "lip in lip mm", "teeth_mm": "lip in teeth mm", "through_mm": "tooth through skin mm"}
+LIP_GAP_BAR_MM = 0.3
 LIP_REACH_MM = 12.0  # along the skin from the seam, outwards and inwards: what counts as lip
 FACE_MM = 45.0  # from the seam: skin that teeth could stand out of
 MOST_MM = 8.0  # nothing crosses deeper: what seems to has met the other lip from behind
@@ -43,8 +46,7 @@ def mouth_poses(rig, at=WEIGHTS):
     poses = {}
     skin = rig.meshes[0]
     lips = rig.regions["lips"]
-    extra = {target for steps in rig.in_betweens.values() for target in steps.values()} | set(rig.correctives)
-    names = [name for name in rig.target_names if name not in extra]
+    names = rig.plain().target_names
     moving = [n for n in names if np.abs(skin.deltas[rig.target_names.index(n), lips]).max(initial=0.0) > MOVES_MM]
     both = [n.removesuffix("Left") for n in moving if n.endswith("Left") and n.startswith("mouth") and len(n) > 9]
     for name in [*moving, *both]:
@@ -95,6 +97,39 @@ def measure_mouth(rig, poses=None, plain=True):
         pairs = zip(*(mouth.figures(weights, full) for full in columns))
         result["poses"][name] = dict(zip(("crossing_mm", "teeth_mm", "through_mm"), pairs))
     return result
+
+
+def mouth_rows(rig):
+    """Rows of measure_mouth beside their bars, each shape at its worst on the way to 1."""
+    found = measure_mouth(rig)
+    rows = [
+        Row("mouth", "neutral", "lip gap mm", found["lip_gap_mm"], bar=(None, LIP_GAP_BAR_MM)),
+        Row("mouth", "any", "upper teeth move mm", found["upper_teeth_moved_mm"], bar=(None, MOVES_MM)),
+        Row("mouth", "any", "neck ring moves mm", found["neck_moved_mm"], bar=(None, MOVES_MM)),
+    ]
+    if "mouth_close_gap_mm" in found:
+        gaps = found["mouth_close_gap_mm"]
+        rows.append(Row("mouth", "jawOpen + mouthClose", "lip gap mm", *gaps, bar=(None, CLOSE_BAR_MM)))
+    for pose, figures in worst_on_the_way(found["poses"]).items():
+        for key, bar in BARS_MM.items():
+            rows.append(Row("mouth", pose, FIGURES[key], *figures[key], bar=(None, bar)))
+    return rows
+
+
+def worst_on_the_way(poses):
+    """Poses of one shape ("mouthSmile 0.5") as one, with the worst figure at any weight."""
+    result: dict[str, dict[str, tuple]] = {}
+    for pose, figures in poses.items():
+        name, _, weight = pose.rpartition(" ")
+        known = result.setdefault(name if weight.replace(".", "").isdigit() else pose, {})
+        for key, values in figures.items():
+            known[key] = tuple(map(max, zip(known.get(key, values), values)))
+    return result
+
+
+def lip_crossing(rig):
+    """A function: skin of a pose (n, 3) -> depth in mm of the deepest lip vertex inside the other lip."""
+    return _Mouth(rig).crossing
 
 
 def _moved(rig, part):

@@ -1,4 +1,4 @@
-"""Figures of a finished rig: how far its neutral is from a scan, and whether its shapes are sound."""
+"""Figures of a finished rig: how far its neutral is from a scan."""
 
 from __future__ import annotations
 
@@ -8,16 +8,10 @@ from scipy.spatial.transform import Rotation
 from facewright.evaluate.distances import face_to_scan, scan_to_face
 from facewright.evaluate.eyes import measure_eyes
 from facewright.evaluate.mouth import measure_mouth, mouth_poses
-from facewright.evaluate.quality import (
-    folded_by_shape,
-    lip_gaps_mm,
-    region_faces,
-    torn_edges,
-)
-from facewright.mesh.intersect import self_intersections
+from facewright.evaluate.quality import lip_gaps_mm
+from facewright.evaluate.shapes import measure_shapes
 
 REPORT_WEIGHTS = (0.5, 1.0)  # of each shape, in report.json; `facewright evaluate rig` asks at four
-_STILL_MM = 1e-4
 
 
 def measure_rig_distances(rig, scan, *, count=40000):
@@ -42,48 +36,6 @@ def measure_rig_distances(rig, scan, *, count=40000):
     return {name: {"scan_to_rig": there[name], "rig_to_scan": back[name]} for name in regions}
 
 
-def measure_shapes(rig):
-    """dict target -> {"max_mm", "folded", "torn", "self_intersections"} of every target of the skin at weight 1.
-
-    folded and torn outside the inner mouth; self_intersections: pairs of crossing faces, one of them in region
-    `face`, that the neutral has not
-    """
-    skin = rig.meshes[0]
-    inner = rig.regions["mouth_interior"]
-    outside = ~inner[skin.faces].any(axis=1)
-    in_face = region_faces(rig.regions["face"], skin.faces)
-    rest = _crossing_keys(skin.vertices, skin.faces, np.ones(len(skin.faces), bool))
-    result = {}
-    for name, deltas in zip(rig.target_names, skin.deltas):
-        moved = skin.vertices + deltas
-        now = _crossing_keys(moved, skin.faces, _in_reach(moved, deltas, skin.faces))
-        new = np.setdiff1d(now, rest)
-        pairs = np.stack(np.divmod(new, len(skin.faces)), axis=1)
-        result[name] = {
-            "max_mm": float(np.linalg.norm(deltas, axis=1).max()),
-            "folded": len(folded_by_shape(skin.vertices, moved, skin.faces, outside)),
-            "torn": len(torn_edges(skin.vertices, moved, skin.faces, ~inner)),
-            "self_intersections": int(in_face[pairs].any(axis=1).sum()),
-        }
-    return result
-
-
-def _crossing_keys(vertices, faces, among):
-    """(k,) one number for each pair of crossing faces."""
-    pairs = self_intersections(vertices, faces, among)
-    return pairs[:, 0] * len(faces) + pairs[:, 1]
-
-
-def _in_reach(moved, deltas, faces):
-    """(m,) bool: faces that could cross one that moves."""
-    moving = np.abs(deltas).max(axis=1) > _STILL_MM
-    if not moving.any():
-        return np.zeros(len(faces), bool)
-    corners = moved[faces]
-    now = moved[faces[moving[faces].any(axis=1)]].reshape(-1, 3)
-    return ((corners.max(axis=1) >= now.min(axis=0)) & (corners.min(axis=1) <= now.max(axis=0))).all(axis=1)
-
-
 def measure_rig(rig):
     """dict of what report.json says of a rig, as a player with in-betweens and correctives shows it.
 
@@ -91,7 +43,7 @@ def measure_rig(rig):
     the deepest that lids enter eyeballs, lips each other or teeth, teeth the outer skin; "eyes" radius_mm;
     "shapes" as measure_shapes, of the plain shapes
     """
-    eyes = measure_eyes(rig)
+    eyes = measure_eyes(rig, views=False)
     mouth = measure_mouth(rig, mouth_poses(rig, REPORT_WEIGHTS), plain=False)
     blinks = {pose: figures["margins_mm"][0] for pose, figures in eyes["poses"].items() if "margins_mm" in figures}
     depths = {pose: figures["depth_mm"][0] for pose, figures in eyes["poses"].items()}

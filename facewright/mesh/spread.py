@@ -19,22 +19,34 @@ def spread_smoothly(V, F, handles, values, free, reach_mm=np.inf):
     reach_mm  the field fades over about this distance; without it a tilt at the handles grows with distance
     returns   (n, d); at the border of free the field and its slope vanish
     """
-    n = len(V)
-    field = np.zeros((n, values.shape[1]))
-    field[handles] = values
-    unknown = free.copy()
-    unknown[handles] = False
-    if not unknown.any():
+    return SmoothSpread(V, F, handles, free, reach_mm)(values)
+
+
+class SmoothSpread:
+    """spread_smoothly for many values at the same handles: the system is factored once."""
+
+    def __init__(self, V, F, handles, free, reach_mm=np.inf):
+        self.n, self.handles, self.used = len(V), handles, None
+        unknown = free.copy()
+        unknown[handles] = False
+        if not unknown.any():
+            return
+        near = unknown.copy()
+        near[F[unknown[F].any(axis=1)].ravel()] = True
+        faces = F[near[F].any(axis=1)]  # two rings: enough for L M^-1 L at the unknowns
+        self.used, local = np.unique(faces, return_inverse=True)
+        energy = _bending(V[self.used], local.reshape(-1, 3), reach_mm)
+        self.at = unknown[self.used]
+        rows = energy[self.at]
+        self.factor, self.known = Factorization(rows[:, self.at]), rows[:, ~self.at]
+
+    def __call__(self, values):
+        """(n, d) for values (h, d) at the handles."""
+        field = np.zeros((self.n, values.shape[1]))
+        field[self.handles] = values
+        if self.used is not None:
+            field[self.used[self.at]] = self.factor.solve(-(self.known @ field[self.used[~self.at]]))
         return field
-    near = unknown.copy()
-    near[F[unknown[F].any(axis=1)].ravel()] = True
-    faces = F[near[F].any(axis=1)]  # two rings: enough for L M^-1 L at the unknowns
-    used, local = np.unique(faces, return_inverse=True)
-    energy = _bending(V[used], local.reshape(-1, 3), reach_mm)
-    at = unknown[used]
-    rows = energy[at]
-    field[used[at]] = Factorization(rows[:, at]).solve(-(rows[:, ~at] @ field[used[~at]]))
-    return field
 
 
 class SoftSpread:

@@ -9,7 +9,10 @@ import numpy as np
 from facewright.data import Material, Mesh, Rig
 from facewright.parts.fit import fit_skeleton
 from facewright.parts.iris import EyeLook, paint_eye
+from facewright.parts.paint import PAINTERS
 from facewright.transfer.eyeball import measure_eyeball
+from facewright.transfer.halves import split_in_halves
+from facewright.working_set import read_working_set
 
 _STILL_MM = 1e-6
 SKIN_MAPS = ("albedo", "normal")
@@ -18,8 +21,8 @@ SKIN_MAPS = ("albedo", "normal")
 @dataclass(frozen=True)
 class AssemblyOptions:
     """eyes      how eyes are painted; None leaves them plain
-    left_out  parts that the rig shall not have, by the beginning of their names. Lash cards and the veils around the
-              eye have no textures of their own and are made for one size of ball: worse than nothing
+    left_out  parts that the rig shall not have, by the beginning of their names, unless their material says how they
+              are painted: bare lash cards and veils around the eye are worse than nothing
     """
 
     eyes: EyeLook | None = field(default_factory=EyeLook)
@@ -37,14 +40,17 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     options = options or AssemblyOptions()
     maps = maps or {}
     template = face.template
-    names = template.shape_names
-    if eyes is not None and eyes.extras:
-        names = (*names, *eyes.extras)
-        deltas = np.concatenate([deltas, np.stack(list(eyes.extras.values()))])
+    words = read_working_set()
+    targets = dict(zip(template.shape_names, deltas)) | (eyes.extras if eyes is not None else {})
+    in_betweens = eyes.in_betweens if eyes is not None else {}
+    halves = words.halves(template.shape_names)
+    made, passed = split_in_halves(template, targets, halves, in_betweens)
+    targets |= made
+    deltas = np.stack(list(targets.values()))
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
     meshes = []
     for part in template.parts:
-        if part.name.startswith(options.left_out):
+        if part.name.startswith(options.left_out) and "paint" not in template.materials[part.material]:
             continue
         material, painted = _material(template, part, used, options)
         used.update(painted)
@@ -52,14 +58,17 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     n_skin = template.skin.vertices[1]
     return Rig(
         meshes=tuple(meshes),
-        target_names=names,
+        target_names=tuple(targets),
         skeleton=fit_skeleton(template, face.vertices),
         maps=used,
         regions={name: mask[:n_skin] for name, mask in face.regions.items()},
         lines={name: line for name, line in face.lines.items() if (np.asarray(line) < n_skin).all()},
         info=rig_info(template),
-        in_betweens=eyes.in_betweens if eyes is not None else {},
+        in_betweens=in_betweens | passed,
         correctives=eyes.correctives if eyes is not None else {},
+        halves=halves,
+        expressions=words.expressions,
+        visemes=words.visemes,
     )
 
 
@@ -134,6 +143,10 @@ def _material(template, part, maps, options):
         # Through the pupil of a separate iris its own back is seen, from within.
         plain |= {"color": (1.0, 1.0, 1.0), "double_sided": part.name != part.attach}
         return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
+    if "paint" in look:
+        name = f"{part.material}_albedo"
+        painted = {} if name in maps else {name: PAINTERS[look["paint"]](look)}
+        return Material(part.material, **plain | {"color": (1.0, 1.0, 1.0)}, albedo=name), painted
     return Material(part.material, **plain), {}
 
 
