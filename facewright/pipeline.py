@@ -24,7 +24,7 @@ from facewright.register import RegisterOptions, register
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
-from facewright.transfer import transfer_shapes
+from facewright.transfer import ride_on_lids, transfer_shapes
 from facewright.write.credits import write_credits
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
@@ -232,7 +232,7 @@ def _parts(run, face, template):
 
 def _transfer(run, face, template):
     def work():
-        eyes = solve_eyes(face, transfer_shapes(face))
+        eyes = _with_riders(face, solve_eyes(face, transfer_shapes(face)))
         info = {"names": list(template.shape_names), "extras": list(eyes.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
         info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in eyes.in_betweens.items()]
@@ -246,6 +246,15 @@ def _transfer(run, face, template):
         {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"]},
         {name: tuple(drivers) for name, drivers in info["correctives"]},
     )
+
+
+def _with_riders(face, shapes):
+    """The shapes with lashes and all else that rides on the lids as their final skin wants it."""
+    names = [*face.template.shape_names, *shapes.extras]
+    deltas = np.concatenate([shapes.deltas, *(delta[None] for delta in shapes.extras.values())])
+    deltas = ride_on_lids(face, deltas, names, shapes.correctives)
+    n = len(shapes.deltas)
+    return replace(shapes, deltas=deltas[:n], extras=dict(zip(shapes.extras, deltas[n:])))
 
 
 def _bake(run, scan, face, options):

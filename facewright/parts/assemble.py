@@ -19,8 +19,8 @@ SKIN_MAPS = ("albedo", "normal")
 @dataclass(frozen=True)
 class AssemblyOptions:
     """eyes      how eyes are painted; None leaves them plain
-    left_out  parts that the rig shall not have, by the beginning of their names, unless their material says how they
-              are painted: bare lash cards and veils around the eye are worse than nothing
+    left_out  parts that the rig shall not have, by the beginning of their names, where they just hang on the skin:
+              lash cards without a texture and veils made for one size of ball are worse than nothing
     """
 
     eyes: EyeLook | None = field(default_factory=EyeLook)
@@ -45,7 +45,7 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
     meshes = []
     for part in template.parts:
-        if part.name.startswith(options.left_out) and "paint" not in template.materials[part.material]:
+        if part.attach == "skin" and part.name.startswith(options.left_out):
             continue
         material, painted = _material(template, part, used, options)
         used.update(painted)

@@ -13,6 +13,8 @@ from facewright.mesh.closest import Surface
 from facewright.mesh.raster import RayScene
 from facewright.parts.eyes import LidOptions, eye_radius, fit_lids, moved_to, place_eyeball
 from facewright.solve.procrustes import best_similarity
+from facewright.transfer.eyeball import carried_eyeball
+from facewright.transfer.riders import LidRiders
 
 _MOUTH_REACH_MM = 18.0  # skin this near to the teeth says where they belong
 _JOINT_REACH_MM = 35.0
@@ -59,6 +61,10 @@ def fit_parts(face, options=None):
     for part in template.parts[1:]:
         if part.attach == "skin":
             V[part.vertex_slice] = _carried(template, V, part)
+    for side in ("left", "right"):
+        riders = LidRiders(template, side)
+        if len(riders.index):
+            V[riders.index] = riders.placed(V, carried_eyeball(template, V, side))
     return replace(face, vertices=V, stats=face.stats | {"parts": stats})
 
 
