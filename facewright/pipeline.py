@@ -17,7 +17,7 @@ from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
 from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
-from facewright.parts import build_rig, fit_parts
+from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, build_rig, find_irises, fit_parts
 from facewright.read import read_scan
 from facewright.read.named import named_files
 from facewright.register import RegisterOptions, register
@@ -58,6 +58,7 @@ class JobOptions:
     up            the scan's up axis (x, y, z, -x, -y, -z); default: found
     mirror        the scan is a mirror image of the person: turn it round
     eyes          "template": closed lids are opened to the template's aperture; "as-scanned": left as they are
+    iris          pattern of the irises, one of parts.PATTERNS; their colour is the scan's where it shows them
     landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
     formats       what to write: glb, obj
     shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": in-betweens ("name@0.5")
@@ -74,6 +75,7 @@ class JobOptions:
     up: str | None = None
     mirror: bool = False
     eyes: str = "template"
+    iris: str = "fibres"
     landmarks: str | None = None
     formats: tuple[str, ...] = ("glb",)
     shapes: str = "apple"
@@ -83,6 +85,8 @@ class JobOptions:
     def __post_init__(self):
         if self.eyes not in ("template", "as-scanned"):
             raise ValueError(f"eyes is 'template' or 'as-scanned', got {self.eyes!r}")
+        if self.iris not in PATTERNS:
+            raise ValueError(f"iris is one of {', '.join(PATTERNS)}, got {self.iris!r}")
         if self.shapes not in ("apple", "full"):
             raise ValueError(f"shapes is 'apple' or 'full', got {self.shapes!r}")
         if not self.formats or not set(self.formats) <= {"glb", "obj"}:
@@ -165,7 +169,7 @@ def _run_job(run, path, output, options, inputs, template, folder):
     scan, clean_stats = _read(run, path, options, inputs)
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
-    face = _parts(run, face, template)
+    face = _parts(run, scan, face, template)
     shapes = _transfer(run, face, template)
     maps = _bake(run, scan, face, options)
     report = _write(run, scan, face, shapes, maps, (clean_stats, pose_info), output, options)
@@ -222,9 +226,9 @@ def _register(run, scan, landmarks, placed, template, folder, options):
     return unpack_face(arrays, info, template)
 
 
-def _parts(run, face, template):
+def _parts(run, scan, face, template):
     def work():
-        return pack_face(fit_parts(face))
+        return pack_face(fit_parts(face, irises=find_irises(scan, face)))
 
     arrays, info = run.stage("04-parts", work)
     return unpack_face(arrays, info, template)
@@ -271,7 +275,8 @@ def _write(run, scan, face, shapes, maps, found, output, options):
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
-        rig = build_rig(face, shapes.deltas, maps, eyes=shapes)
+        looks = AssemblyOptions(eyes=EyeLook(pattern=options.iris))
+        rig = build_rig(face, shapes.deltas, maps, looks, eyes=shapes)
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
         carried = rig if options.shapes == "full" else rig.plain()
         report = plain(build_report(scan, face, carried, *found))
@@ -283,7 +288,9 @@ def _write(run, scan, face, shapes, maps, found, output, options):
     def intact(info):
         return output.holds(info["files"])
 
-    return run.stage("07-write", work, [*sorted(options.formats), options.shapes], intact=intact)[1]["report"]
+    return run.stage("07-write", work, [*sorted(options.formats), options.shapes, options.iris], intact=intact)[1][
+        "report"
+    ]
 
 
 def write_results(rig, maps, scan, face, folder, options):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,6 +36,9 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
     """
     options = options or AssemblyOptions()
+    seen = face.stats.get("parts", {}).get("iris_color")
+    if options.eyes is not None and options.eyes.iris_color is None and seen is not None:
+        options = replace(options, eyes=replace(options.eyes, iris_color=tuple(seen)))
     maps = maps or {}
     template = face.template
     names = template.shape_names

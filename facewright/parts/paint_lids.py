@@ -54,7 +54,8 @@ def paint_occlusion(look, size=64):
     upper, lower = look.get("strength", (0.78, 0.45))
     v, u = _down(size), (np.arange(size) + 0.5) / size
     fall = np.where(v > 0.5, upper * np.maximum(2 * v - 1, 0) ** _FADE, lower * np.maximum(1 - 2 * v, 0) ** _FADE)
-    corners = 1 + 0.5 * (np.exp(-((u / 0.12) ** 2)) + np.exp(-(((1 - u) / 0.12) ** 2)))
+    ends = np.minimum(u, 1 - u)  # at the corners the two strips meet and would draw a black line
+    corners = 1 + 0.3 * np.exp(-((ends / 0.2) ** 2)) - np.exp(-((ends / 0.06) ** 2))
     return _with_alpha(np.array(_SHADOW), np.clip(fall[:, None] * corners, 0, 1))
 
 
