@@ -6,7 +6,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-ORDER = ("transfer", "bake", "registration_truth", "real_scans", "invariance", "job")
+ORDER = (
+    "transfer",
+    "shapes",
+    "bake",
+    "registration_truth",
+    "real_scans",
+    "invariance",
+    "job",
+    "compression",
+    "compression_web",
+)
 
 
 def main():

@@ -1,77 +1,412 @@
-"""FaceZip on a set of textures: time, error against PCA and the rank-4 blocks, and the permutation search.
+"""FaceZip against its bars: quality on every set, search, seams, limits, BC7, time and memory, and the paper's own way.
 
-python bench/compression.py SET/     with neutral.png, mesh.obj and textures/
+    python bench/compression.py [PART ...] [--set FOLDER ...] [--sizes 512 1024] [--restarts 2]
+
+PART  quality search seams examples time published large (default: all but large). Sets are the folders of
+      ../shared/data/textures (neutral.png, mesh.obj, textures/) and generated ones. Time is of 20 generated textures,
+      from decoded images to PNG and JSON; cpu is what all cores spent, quiet what two cores would need that do
+      nothing else: the main thread's seconds and half of the others'.
+large adds 2048 and 4096 with their memory, and 100 textures at 4096; each runs in a process of its own.
 """
 
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
 import sys
+import tempfile
 import time
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
+from common import ROOT, Verdict, print_table
 
-from facewright.compress import FacezipOptions, facezip, facezip_decode
-from facewright.compress.encode import published_search
+from facewright.compress import FacezipOptions, example_weights, facezip
+from facewright.compress.evaluation import (
+    METHODS,
+    TextureSet,
+    block_bound,
+    decode_float,
+    measure,
+    run_method,
+    search_curves,
+)
 from facewright.compress.files import list_textures, read_texture, read_uv_mesh
-from facewright.compress.masks import build_masks, covered_texels
+from facewright.compress.folder import write_packed
+from facewright.compress.ktx2 import block_compressed, encoder_missing
+from facewright.compress.masks import build_masks
+from facewright.compress.packed import with_examples
+from facewright.compress.published import best_published
+from facewright.compress.synthetic import ExpressionSource, expression_set
 from facewright.compress.tiles import TextureTiles
 
-
-def rmse(images, textures, covered):
-    """Mean and worst RMSE of 8-bit images on covered texels."""
-    errors = [np.sqrt(np.mean((a[covered].astype(float) - b[covered]) ** 2)) for a, b in zip(images, textures)]
-    return float(np.mean(errors)), float(np.max(errors))
-
-
-def low_rank(neutral, textures, k, covered, block=None):
-    """Textures of rank k in float, of the whole set (PCA) or of every block of so many texels."""
-    x = np.stack([t.astype(np.float32) - neutral for t in textures]) * covered[:, :, None]
-    n, h, w, c = x.shape
-    if block is None:
-        x = x.reshape(1, n, -1)
-    else:
-        x = (
-            x.reshape(n, h // block, block, w // block, block, c)
-            .transpose(1, 3, 0, 2, 4, 5)
-            .reshape(-1, n, block**2 * c)
-        )
-    _, vectors = np.linalg.eigh(x @ x.transpose(0, 2, 1))
-    v = vectors[:, :, -k:]
-    x = v @ (v.transpose(0, 2, 1) @ x)
-    if block is not None:
-        x = x.reshape(h // block, w // block, n, block, block, c).transpose(2, 0, 3, 1, 4, 5)
-    return np.clip(x.reshape(n, h, w, c) + neutral, 0, 255)
+TEXTURES = ROOT.parent / "shared" / "data" / "textures"
+PARTS = ("quality", "search", "seams", "examples", "time", "published")
+# strength and noise of the generated sets; the last has as much noise as signal
+GENERATED = ((14, 0), (14, 2), (8, 1), (30, 2), (14, 5))
+SECONDS = {512: 3, 1024: 8, 2048: 30, 4096: 150}
+SUPPORT = 0.05
+PAPER_SECONDS = {512: 1102, 1024: 3794, 2048: 16216}
 
 
-def main(folder):
-    """Print every figure of a set."""
+def read_set(folder):
+    """TextureSet of a folder with neutral.png, mesh.obj and textures/."""
     paths = list_textures(folder / "textures", folder / "neutral.png")
-    neutral, textures = read_texture(folder / "neutral.png"), [read_texture(path) for path in paths]
-    mesh = read_uv_mesh(folder / "mesh.obj")
-    covered = covered_texels(mesh.uv, mesh.uv_faces, *neutral.shape[:2])
-    for name, k, block in (("PCA(4), float", 4, None), ("PCA(8), float", 8, None), ("rank 4 of 8x8 blocks", 4, 8)):
-        print(
-            f"{name:28s} mean %.3f  worst %.3f"
-            % rmse(low_rank(neutral, textures, k, covered, block), textures, covered)
-        )
-    eye = np.eye(len(textures))
-    runs = {"published, no permutation": FacezipOptions("paper", permute=False), "published": FacezipOptions("paper")}
-    for name, options in {**runs, "refined": FacezipOptions()}.items():
-        start = time.perf_counter()
-        packed = facezip(neutral, textures, mesh=mesh, options=options)
-        seconds = time.perf_counter() - start
-        figures = rmse([facezip_decode(packed, row) for row in eye], textures, covered)
-        print(f"{name:28s} mean %.3f  worst %.3f  {seconds:.2f} s  {packed.memory_bytes()} bytes" % figures)
-    tiles = TextureTiles(neutral, textures, len(textures), covered.astype(np.float32))
-    masks, _ = build_masks(mesh, tiles.grid, 53)
-    search = published_search(tiles, masks, 4)[0]
-    best = search.restarts(100)[0].min()
-    for seed in (0, 1):
-        start = time.perf_counter()
-        cost = search.cost(search.solve(seed)[None])[0]
-        print(
-            f"search, seed {seed}: {100 * (1 - cost / best):.1f} % below restarts, {time.perf_counter() - start:.2f} s"
-        )
+    neutral, mesh = read_texture(folder / "neutral.png"), read_uv_mesh(folder / "mesh.obj")
+    return TextureSet.of(neutral, [read_texture(path) for path in paths], [path.stem for path in paths], mesh)
+
+
+def generated_sets():
+    """(name, TextureSet, rms of the true differences / noise) of generated sets."""
+    for strength, noise in GENERATED:
+        made = expression_set(512, 20, strength=strength, noise=noise)
+        textures = TextureSet(made.neutral, made.textures, made.names, made.mesh, made.covered, made.truth)
+        yield f"generated {strength}/{noise}", textures, made.signal_rms / noise if noise else np.inf
+
+
+def quality(sets, verdict):
+    """RMSE of all methods on all sets against the bars."""
+    rows = []
+    for name, textures, signal in sets:
+        outcomes = {method: run_method(textures, method, options) for method, options in METHODS.items()}
+        bound = block_bound(textures).mean()
+        mean = {method: outcome.rmse.mean() for method, outcome in outcomes.items()}
+        ours = outcomes["refined"]
+        rows.append([name, *mean.values(), ours.rmse.max(), bound, ours.psnr.mean(), ours.ssim.mean()])
+        height, width = textures.neutral.shape[:2]
+        limit = (15 + len(textures.names) / 16) * width * height
+        verdict.check(name, "bytes of (15 + N/16) W H", ours.memory_bytes / limit, 1.0)
+        if len(textures.names) >= 16:
+            verdict.check(name, "refined, max(0.45 PCA(8), B4)", mean["refined"], max(0.45 * mean["PCA(8)"], bound))
+            verdict.check(name, "refined, max(0.5 published, B4)", mean["refined"], max(0.5 * mean["published"], bound))
+        verdict.check(name, "refined - PCA(4), mean", mean["refined"] - mean["PCA(4)"], 0.05)
+        if bound <= 0.8 * mean["PCA(4)"]:
+            verdict.check(name, "refined - PCA(4), any texture", (ours.rmse - outcomes["PCA(4)"].rmse).max(), 0.0)
+        if name.startswith("unrelated"):
+            verdict.check(name, "mean RMSE", mean["refined"], 3.1)
+            verdict.check(name, "worst RMSE", ours.rmse.max(), 3.5)
+            for other in ("PCA(8)", "published"):
+                verdict.check(name, f"refined / {other}", mean["refined"] / mean[other], 0.4)
+            check_blocks(name, textures, ours, verdict)
+        if textures.truth is not None and signal >= 2.5:
+            for other in ("PCA(8)", "published"):
+                share = ours.truth_rmse.mean() / outcomes[other].truth_rmse.mean()
+                verdict.check(name, f"to the truth, refined / {other}", share, 0.5)
+    header = ["mean RMSE", *METHODS, "worst", "B4", "PSNR", "SSIM"]
+    print_table("Quality (refined in the last columns)", header, rows)
+
+
+def check_blocks(name, textures, ours, verdict):
+    """What BC7 adds."""
+    if encoder_missing("bc7"):
+        print(encoder_missing("bc7"))
+        return
+    coded = block_compressed(ours.packed, neutral=False)
+    pairs = zip(coded.textures, ours.packed.textures)
+    code = np.sqrt(np.mean([(a.astype(float) - b)[textures.covered] ** 2 for a, b in pairs]))
+    print(f"{name}: BC7 moves the codes of difference textures by {code:.2f} of 255 (RMSE)")
+    added = measure(textures, "BC7", coded).rmse.mean() - ours.rmse.mean()
+    verdict.check(name, "RMSE added by BC7 of the differences", added, 0.5)
+
+
+def search(sets, verdict):
+    """The permutation search against 100 random restarts on identical masks."""
+    rows = []
+    for name, textures, _ in sets:
+        curves = search_curves(textures)
+        best, (one, two) = curves["history"][-1].min(), curves["ours"].values()
+        rows.append([name, curves["masks"], *(x / best for x in (one, two, curves["bound"])), curves["seconds"]])
+        # Where even the bound is above the bar, restarts are near the optimum already and there is nothing to gain.
+        if curves["bound"] / best <= 0.75:
+            verdict.check(name, "search / best of 100 restarts", max(one, two) / best, 0.75)
+        verdict.check(name, "two seeds differ by", abs(one - two) / min(one, two), 0.01)
+    header = ["set", "masks", "seed 0", "seed 1", "bound for any state", "seconds"]
+    print_table("Permutation cost / that of the best of 100 random restarts", header, rows)
+
+
+def seams(sets, verdict):
+    """Mean gradient across borders of blocks and masks, relative to the original's, against that inside."""
+    rows = []
+    for name, textures, _ in sets:
+        packed = facezip(textures.neutral, textures.textures, mesh=textures.mesh, covered=textures.covered)
+        ratios = border_ratios(textures, packed)
+        rows.append([name, *ratios.values()])
+        for where, ratio in ratios.items():
+            verdict.check(name, f"gradient across {where} borders", abs(ratio - 1), 0.02)
+    print_table("Gradient across borders / inside, relative to the original", ["set", "blocks", "masks"], rows)
+
+
+def border_ratios(textures, packed, blends=30, seed=0):
+    """dict: (gradient of the blend / of the original) at the borders of blocks and masks, over that elsewhere."""
+    rng = np.random.default_rng(seed)
+    height, width = textures.neutral.shape[:2]
+    grid = packed.grid
+    masks, _ = build_masks(textures.mesh, grid, 53)
+    owner = grid.upsample(masks).argmax(axis=2)
+    inside = textures.covered[:, 1:] & textures.covered[:, :-1], textures.covered[1:] & textures.covered[:-1]
+    # Weights are interpolated between centres of cells: their kinks lie at 4, 12, 20 ... texels, cells end at 8, 16 ...
+    borders = {
+        "blocks": [np.broadcast_to(k % 4 == 0, ok.shape) for k, ok in zip(_edges(height, width), inside)],
+        "masks": [owner[:, 1:] != owner[:, :-1], owner[1:] != owner[:-1]],
+    }
+    sums = {where: np.zeros(4) for where in borders}
+    d = packed.difference_textures()
+    for _ in range(blends):
+        chosen = rng.choice(len(packed.names), 3, replace=False)
+        weights = np.zeros(len(packed.names))
+        weights[chosen] = rng.uniform(0.2, 0.6, 3)
+        image = decode_float(packed, weights, d)
+        base = textures.neutral.astype(np.float32)
+        original = base + sum(np.float32(weights[n]) * (textures.textures[n].astype(np.float32) - base) for n in chosen)
+        for axis in (1, 0):
+            mine, wanted = (np.abs(np.diff(x, axis=axis)).mean(axis=2) for x in (image, original))
+            ok = inside[1 - axis]
+            for where, edges in borders.items():
+                edge = edges[1 - axis]
+                sums[where] += [
+                    mine[ok & edge].sum(),
+                    wanted[ok & edge].sum(),
+                    mine[ok & ~edge].sum(),
+                    wanted[ok & ~edge].sum(),
+                ]
+    return {where: (s[0] / s[1]) / (s[2] / s[3]) for where, s in sums.items()}
+
+
+def _edges(height, width):
+    return np.arange(1, width)[None], np.arange(1, height)[:, None]
+
+
+def examples(sets, verdict):
+    """Eq. 10 before and after 8 bits, and Fig. 8: shapes against the naive blend of whole textures."""
+    name, textures, _ = sets[0]
+    packed = facezip(textures.neutral, textures.textures, mesh=textures.mesh, covered=textures.covered)
+    B = np.random.default_rng(0).random((len(textures.names), 52)) * (np.random.default_rng(1).random((20, 52)) < 0.3)
+    maps = packed.weight_maps()[packed.layers]
+    before = np.abs(np.tensordot(B, example_weights(packed, B), 1) - maps).max()
+    shapes = with_examples(packed, [f"shape{m}" for m in range(B.shape[1])], B)
+    step = (np.abs(B) @ (0.5 * shapes.weight_step)).max(axis=0)
+    after = np.abs(np.tensordot(B, shapes.weight_maps(), 1) - maps).max(axis=(0, 1, 2))
+    verdict.check(name, "Eq. 10 before 8 bits", before, 1e-6)
+    verdict.check(name, "Eq. 10 after, of the sum of half steps", (after / step).max(), 1.0)
+
+
+def timing(sizes, verdict):
+    """Seconds from decoded images to PNG and JSON, on the wall and of all cores; each size in its own process."""
+    rows = []
+    for size in sizes:
+        figures = in_process(size, 20)
+        row = [size, 20, *(figures[key] for key in ("wall", "cpu", "quiet", "mb", "rmse")), PAPER_SECONDS.get(size)]
+        rows.append([*row, figures["ktx2"], figures["preview"]])
+        verdict.check(f"{size}, 20 textures", "seconds", figures["wall"], SECONDS[size])
+        if size == 4096:
+            verdict.check("4096, 20 textures", "GB", figures["mb"] / 1000, 12)
+    header = ["size", "textures", "wall s", "cpu s", "quiet s", "peak MB", "RMSE", "paper s", "ktx2 s", "preview s"]
+    print_table("Time", header, rows)
+
+
+def in_process(size, count):
+    """Figures of one compression in a process of its own."""
+    command = [sys.executable, __file__, "--one", str(size), str(count)]
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()[-1])
+
+
+def one(size, count):
+    """Compress generated textures and print the figures as JSON."""
+    drawn = min(size, 2048)  # time does not depend on what is in the images
+    source = ExpressionSource(drawn)
+    wide = size // drawn
+
+    def grow(image):
+        return image.repeat(wide, axis=0).repeat(wide, axis=1) if wide > 1 else image
+
+    held = [source.draw(n)[0] for n in range(min(count, 20))]
+    fetch = (
+        (lambda n: grow(held[n])) if count <= 20 else (lambda n: grow(np.roll(held[n % 20], 16 * (n // 20), axis=1)))
+    )
+    neutral, covered = grow(source.neutral), grow(source.covered)
+    if count <= 20:
+        held = [grow(image) for image in held]
+        fetch = held.__getitem__
+    del source.patterns
+    names = [f"t{n}" for n in range(count)]
+    start, busy, alone = time.perf_counter(), time.process_time(), time.thread_time()
+    packed = facezip(neutral, fetch, names=names, covered=covered)
+    with tempfile.TemporaryDirectory() as folder:
+        write_packed(packed, folder)
+        wall, cpu = time.perf_counter() - start, time.process_time() - busy
+        serial, peak = time.thread_time() - alone, own_peak_mb()
+        seconds = packed.report["seconds"]
+        quiet = serial + (cpu - serial) / 2
+        figures = {"wall": wall, "cpu": cpu, "quiet": quiet, "mb": peak, "rmse": packed.report["mean_rmse"], **seconds}
+        figures["ktx2"] = figures["preview"] = None
+        if count <= 20 and size <= 2048:
+            from facewright.compress.preview import preview_page
+
+            start = time.perf_counter()
+            if not encoder_missing("bc7"):
+                write_packed(packed, folder, "bc7")
+                figures["ktx2"] = time.perf_counter() - start
+            start = time.perf_counter()
+            preview_page(packed, fetch, count)
+            figures["preview"] = time.perf_counter() - start
+    print(json.dumps(figures))
+
+
+def own_peak_mb():
+    """Peak resident memory of this process alone, MB; getrusage counts the parent's before exec too."""
+    status = Path("/proc/self/status")
+    if not status.is_file():
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    return next(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) / 1e3
+
+
+def published_procedure(sets, restarts, verdict):
+    """The paper's own way: k-means on the pixels of fragments, permutations tried on pixels, random restarts.
+
+    Quicker than the paper tells it: fragments are cut to where their mask is above SUPPORT, which leaves each a few
+    neighbours, and the pairs of a permutation are summed once for all 24.
+    """
+    name, textures, _ = sets[0]
+    k = 4
+    tiles = TextureTiles.of(textures.neutral, textures.textures, textures.covered)
+    masks, _ = build_masks(textures.mesh, tiles.grid, 53)
+    full = tiles.grid.upsample(masks)
+    x = np.stack([(t.astype(np.float32) - textures.neutral) * textures.covered[:, :, None] for t in textures.textures])
+    started = time.perf_counter(), time.process_time()
+    places, centroids = [], []
+    for m in range(full.shape[2]):
+        rows, columns = (np.flatnonzero((full[:, :, m] > SUPPORT).any(axis=axis)) for axis in (1, 0))
+        box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        fragments = (x[:, box[0], box[1]] * full[box[0], box[1], m, None]).reshape(len(x), -1)
+        labels = pixel_kmeans(fragments, k, restarts=10, seed=m)
+        means = [fragments[labels == i].mean(axis=0) if (labels == i).any() else 0 * fragments[0] for i in range(k)]
+        centroids.append([mean.reshape(len(rows_of(box[0])), -1, 3) for mean in means])
+        places.append(box)
+    clustered = time.perf_counter() - started[0], time.process_time() - started[1]
+    started = time.perf_counter(), time.process_time()
+    for seed in range(restarts):
+        pixel_permutations(places, centroids, full, seed, sweeps=10)
+    searched = time.perf_counter() - started[0], time.process_time() - started[1]
+    start, busy = time.perf_counter(), time.process_time()
+    best_published(tiles, k, FacezipOptions("paper"), textures.mesh, None, lambda stage, share: None)
+    fast = time.perf_counter() - start, time.process_time() - busy
+    start, busy = time.perf_counter(), time.process_time()
+    facezip(textures.neutral, textures.textures, mesh=textures.mesh)
+    refined = time.perf_counter() - start, time.process_time() - busy
+    whole = [c + s / restarts * 100 for c, s in zip(clustered, searched)]
+    rows = [
+        ["k-means on pixels", *clustered],
+        [f"permutation on pixels, {restarts} restarts", *searched],
+        ["both, 100 restarts (extrapolated)", *whole],
+        ["the same steps on Gram matrices, masks and images too", *fast],
+        ["refined, all of it", *refined],
+    ]
+    print_table(f"The published procedure on {name}", ["step", "wall s", "cpu s"], rows)
+    print(
+        f"refined is {whole[1] / refined[1]:.0f} times faster (cpu), the published steps {whole[1] / fast[1]:.0f} times"
+    )
+    verdict.check(name, "refined / published procedure, cpu", refined[1] / whole[1], 0.01)
+
+
+def rows_of(part):
+    return range(part.start, part.stop)
+
+
+def pixel_kmeans(points, k, restarts, seed, iterations=300):
+    """Lloyd's k-means on (n, pixels), k-means++ starts, the best of some: what a library does with fragments."""
+    rng = np.random.default_rng(seed)
+    best, least = None, np.inf
+    lengths = (points**2).sum(axis=1)[:, None]
+    for _ in range(restarts):
+        centres = points[rng.choice(len(points), 1)]
+        while len(centres) < k:
+            near = np.maximum(_distances(points, lengths, centres).min(axis=1), 0) + 1e-3
+            centres = np.concatenate([centres, points[rng.choice(len(points), 1, p=near / near.sum())]])
+        labels = None
+        for _ in range(iterations):
+            distance = _distances(points, lengths, centres)
+            following = distance.argmin(axis=1)
+            if labels is not None and (following == labels).all():
+                break
+            labels = following
+            for i in range(k):
+                if (labels == i).any():
+                    centres[i] = points[labels == i].mean(axis=0)
+        if best is None or (len(set(labels)) == k and distance.min(axis=1).sum() < least):
+            best, least = labels, distance.min(axis=1).sum()
+    return best
+
+
+def _distances(points, lengths, centres):
+    return lengths - 2 * points @ centres.T + (centres**2).sum(axis=1)
+
+
+def pixel_permutations(places, centroids, masks, seed, sweeps):
+    """Eq. 3-4 on pixels: sweeps over masks, every permutation of each tried against the others, from a random one."""
+    rng = np.random.default_rng(seed)
+    choices = list(permutations(range(4)))
+    state = [choices[i] for i in rng.integers(24, size=len(places))]
+    for _ in range(sweeps):
+        for m, box in enumerate(places):
+            costs = np.zeros(24)
+            for other, beside in enumerate(places):
+                rows = max(box[0].start, beside[0].start), min(box[0].stop, beside[0].stop)
+                columns = max(box[1].start, beside[1].start), min(box[1].stop, beside[1].stop)
+                if other == m or rows[0] >= rows[1] or columns[0] >= columns[1]:
+                    continue
+                both = slice(*rows), slice(*columns)
+                mine, theirs = (_crop(centroids[i], places[i], both) for i in (m, other))
+                # fragments carry their own mask: each times the other's is the difference under both
+                mine = mine * masks[both][:, :, other, None]
+                theirs = theirs * masks[both][:, :, m, None]
+                table = np.array([[((a - b) ** 2).sum() for b in theirs] for a in mine])
+                costs += [sum(table[p[i], state[other][i]] for i in range(4)) for p in choices]
+            state[m] = choices[int(costs.argmin())]
+    return state
+
+
+def _crop(images, place, part):
+    rows = slice(part[0].start - place[0].start, part[0].stop - place[0].start)
+    columns = slice(part[1].start - place[1].start, part[1].stop - place[1].start)
+    return np.stack([image[rows, columns] for image in images])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join([*PARTS, "large"]))
+    parser.add_argument("--set", type=Path, nargs="*", help="folders with neutral.png, mesh.obj and textures/")
+    parser.add_argument("--sizes", type=int, nargs="*", default=[512, 1024])
+    parser.add_argument("--restarts", type=int, default=1, help="of the published procedure; extrapolated to 100")
+    parser.add_argument("--one", type=int, nargs=2, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        one(*options.one)
+        return
+    parts = options.parts or PARTS
+    unknown = set(parts) - {*PARTS, "large"}
+    if unknown:
+        parser.error(f"no such part: {', '.join(sorted(unknown))}")
+    folders = options.set if options.set is not None else sorted(TEXTURES.glob("*/")) if TEXTURES.is_dir() else []
+    verdict = Verdict()
+    sets = [(folder.name, read_set(folder), np.inf) for folder in folders] + list(generated_sets())
+    run = {"quality": quality, "search": search, "seams": seams, "examples": examples}
+    for part in parts:
+        if part in run:
+            run[part](sets, verdict)
+    if "published" in parts:
+        published_procedure(sets, options.restarts, verdict)
+    if "time" in parts:
+        timing(options.sizes, verdict)
+    if "large" in parts:
+        timing([2048, 4096], verdict)
+        figures = in_process(4096, 100)
+        print_table("100 textures at 4096", list(figures), [list(figures.values())])
+        verdict.check("4096, 100 textures", "GB", figures["mb"] / 1000, 16)
+    verdict.print()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

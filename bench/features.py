@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from common import read_json
 
-from facewright.mesh.adjacency import vertex_adjacency
-from facewright.mesh.closest import Surface
-from facewright.mesh.normals import vertex_normals
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.raster import RayScene
 
 # james.ljson keeps its points label by label; iBUG-68 numbers of each block of 68, in its own order.
 LJSON_TO_IBUG = (
@@ -20,23 +20,50 @@ LJSON_TO_IBUG = (
 )
 
 
-def feature_vertices(template):
-    """dict feature -> vertex index on the template's neutral: corners, lip contour, canthi, nose."""
+def feature_points(template, vertices):
+    """dict feature -> (3,) on a fit (n, 3): corners, lip contour, canthi, nose.
+
+    The border of the red is the template's line. Mouth corners, canthi and alar wings were picked by hand on close-ups
+    of the template's neutral as they were on the scans (data/templates.features.json): the ends of the lines of contact
+    lie out of sight in the folds.
+    """
     V, lines = template.vertices, template.lines
     upper, lower = lines["lip_outer_upper"], lines["lip_outer_lower"]
-    features = {"mouth_corner_right": lines["lip_seam_upper"][0], "mouth_corner_left": lines["lip_seam_upper"][-1]}
+    features = {}
     for side in ("right", "left"):
-        features[f"canthus_inner_{side}"] = lines[f"lid_upper_{side}"][0]
-        features[f"canthus_outer_{side}"] = lines[f"lid_upper_{side}"][-1]
         mine = upper[V[upper, 0] < 0] if side == "right" else upper[V[upper, 0] > 0]
         features[f"lip_peak_{side}"] = mine[V[mine, 1].argmax()]
     features["lip_upper_middle"] = upper[np.abs(V[upper, 0]).argmin()]
     features["lip_lower_middle"] = lower[np.abs(V[lower, 0]).argmin()]
-    return {name: int(vertex) for name, vertex in (features | _nose(template, features["lip_upper_middle"])).items()}
+    features |= _nose(template, features["lip_upper_middle"])
+    return {name: vertices[vertex] for name, vertex in features.items()} | _picked(template, vertices)
+
+
+def _picked(template, vertices):
+    """Features picked on the template's left half and mirrored, carried to a fit (n, 3)."""
+    stop = template.skin.vertices[1]
+    faces = template.faces[template.skin.face_slice]
+    scene = RayScene(template.vertices[:stop], faces)
+    result = {}
+    for name, (x, y) in read_json("templates.features.json")[template.info["name"]].items():
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            hit = scene.cast(np.array([[sign * x, y, 500.0]]), np.array([[0.0, 0.0, -1.0]]))
+            result[f"{name}_{side}"] = interpolate(vertices[:stop], faces, hit.face, hit.barycentric)[0]
+    return result
+
+
+def off_by_mm(name, fitted, picked):
+    """mm between a feature on a fit and its picking, (3,) each.
+
+    An alar wing is picked at the nose's outline from in front, where the surface runs along the line of sight: the
+    picking says nothing about its depth.
+    """
+    seen = [1.0, 1.0, 0.0] if name.startswith("alar_wing") else [1.0, 1.0, 1.0]
+    return float(np.linalg.norm((fitted - picked) * seen))
 
 
 def _nose(template, lip_middle):
-    """Nose tip, subnasale and the widest points of the alar wings, from the shape of the neutral."""
+    """Vertices of nose tip and subnasale, from the shape of the neutral."""
     V = template.vertices
     face = np.flatnonzero(template.regions["face"] & ~template.regions["nostrils"])
     middle = face[(np.abs(V[face, 0]) < 2.0) & (V[face, 1] < -5.0) & (V[face, 1] > V[lip_middle, 1])]
@@ -45,26 +72,8 @@ def _nose(template, lip_middle):
     a, b = V[tip, 1:], V[lip_middle, 1:]
     below = middle[V[middle, 1] < V[tip, 1] - 2.0]
     chord = (b - a) / np.linalg.norm(b - a)
-    behind = chord[0] * (V[below, 2] - a[1]) - chord[1] * (V[below, 0 + 1] - a[0])
-    subnasale = below[np.abs(behind).argmax()]
-    normals = vertex_normals(V, template.faces[template.skin.face_slice])
-    near = face[(V[face, 1] < V[tip, 1] + 8.0) & (V[face, 1] > V[subnasale, 1] - 3.0)]
-    near = near[(np.abs(V[near, 0]) < 26.0) & (V[near, 2] > V[subnasale, 2] - 14.0)]
-    result = {"nose_tip": tip, "subnasale": subnasale}
-    # The wing is a bulge: behind its rim the groove to the cheek looks sideways too, out of the sight of who picks.
-    bulges = near[_height_over_neighbours(template, normals)[near] > 0]
-    for side, sign in (("right", -1.0), ("left", 1.0)):
-        wing = bulges[sign * normals[bulges, 0] > 0.85]
-        result[f"alar_wing_{side}"] = wing[(sign * V[wing, 0]).argmax()]
-    return result
-
-
-def _height_over_neighbours(template, normals):
-    """(n,) mm by which a vertex stands over the mean of its neighbours: positive where the skin bulges."""
-    V = template.vertices
-    A = vertex_adjacency(template.faces[template.skin.face_slice], len(V))
-    count = np.maximum(np.asarray(A.sum(axis=1)).ravel(), 1.0)
-    return np.einsum("nc,nc->n", V - (A @ V) / count[:, None], normals)
+    behind = chord[0] * (V[below, 2] - a[1]) - chord[1] * (V[below, 1] - a[0])
+    return {"nose_tip": tip, "subnasale": below[np.abs(behind).argmax()]}
 
 
 def ibug_positions(template, vertices):

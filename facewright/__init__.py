@@ -46,6 +46,9 @@ _MODULES = {
     # what passes between the stages
     "facewright.data": ("Scan", "Landmarks", "Template", "Part", "Skeleton", "Face", "Material", "Mesh", "Rig"),
     "facewright.conventions": ("ARKIT_SHAPES",),
+    # how shapes are meant and played
+    "facewright.expand": ("expand_weights",),
+    "facewright.working_set": ("read_working_set",),
     # how Facewright says no
     "facewright.errors": ("InputError", "StageError"),
 }

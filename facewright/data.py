@@ -309,6 +309,8 @@ class Rig:
     target_names (t,) the one list of targets that every moving mesh carries, in this order
     in_betweens  dict target -> {weight: target name of the in-between}; expand.py has the rule
     correctives  dict target -> tuple of driver names
+    halves       dict sum -> (left, right): targets that stand for a target's two sides and add up to it
+    expressions, visemes  dict name -> {shape: weight}
     maps         name -> (h, w, c) uint8 image; info["maps"][name] says colour space and convention
     regions      name -> (n_skin,) bool on meshes[0]; lines name -> vertex indices on meshes[0]
     info         dict: template, topology_id, credits, copyright, units, T_rig_to_scan (4x4 nested list), ...
@@ -323,6 +325,9 @@ class Rig:
     info: dict[str, Any]
     in_betweens: dict[str, dict[float, str]] = field(default_factory=dict)
     correctives: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    halves: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    expressions: dict[str, dict[str, float]] = field(default_factory=dict)
+    visemes: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self):
         for mesh in self.meshes:
@@ -332,12 +337,35 @@ class Rig:
                 )
 
     def plain(self):
-        """The Rig without in-betweens and correctives: for players that know one weight per shape."""
-        extra = {target for steps in self.in_betweens.values() for target in steps.values()} | set(self.correctives)
-        keep = [i for i, name in enumerate(self.target_names) if name not in extra]
+        """The Rig without in-betweens, correctives and halves: for players that know one weight per shape."""
+        extra = self._in_between_targets() | set(self.correctives) | self._half_targets()
+        names = [name for name in self.target_names if name not in extra]
+        return replace(self._with_targets(names), in_betweens={}, correctives={}, halves={})
+
+    def full(self):
+        """The Rig with halves in place of their sums, in-betweens and correctives: expand_weights plays it."""
+        swap = dict(self.halves)
+        for name, sides in self.halves.items():
+            for weight, target in self.in_betweens.get(name, {}).items():
+                swap[target] = tuple(self.in_betweens[half][weight] for half in sides)
+        gone = self._half_targets()
+        names = [spelt for name in self.target_names if name not in gone for spelt in swap.get(name, (name,))]
+        in_betweens = {name: steps for name, steps in self.in_betweens.items() if name not in self.halves}
+        return replace(self._with_targets(names), in_betweens=in_betweens)
+
+    def _in_between_targets(self):
+        return {target for steps in self.in_betweens.values() for target in steps.values()}
+
+    def _half_targets(self):
+        """Targets that a half has: itself and its in-betweens."""
+        halves = {half for pair in self.halves.values() for half in pair}
+        return halves | {target for half in halves for target in self.in_betweens.get(half, {}).values()}
+
+    def _with_targets(self, names):
+        """The same Rig with these targets only, in this order."""
+        keep = [self.target_names.index(name) for name in names]
         meshes = tuple(mesh if mesh.deltas is None else replace(mesh, deltas=mesh.deltas[keep]) for mesh in self.meshes)
-        names = tuple(self.target_names[i] for i in keep)
-        return replace(self, meshes=meshes, target_names=names, in_betweens={}, correctives={})
+        return replace(self, meshes=meshes, target_names=tuple(names))
 
     def __repr__(self):
         return f"Rig({len(self.meshes)} meshes, {len(self.target_names)} targets, maps {sorted(self.maps)})"

@@ -8,15 +8,18 @@ from __future__ import annotations
 from itertools import pairwise
 
 
-def expand_weights(pose_weights, in_betweens, correctives):
+def expand_weights(pose_weights, in_betweens, correctives, halves=None):
     """dict target -> weight of every target that plays a part, from dict shape -> weight.
 
     in_betweens  shape -> {weight: target}: targets the shape passes on its way to 1; each acts by a hat function that
                  is 1 at its own weight and 0 at its neighbours'. Outside 0..1 the nearest piece goes on.
     correctives  target -> drivers: acts with the product of the drivers' weights, each clipped to 0..1
+    halves       sum -> (left, right), for a rig that has these in its place: a weight of the sum is given to both, and
+                 as a driver it weighs as much as its halves on average
     """
     result = {}
-    for name, weight in pose_weights.items():
+    pose, drive = _halved(pose_weights, halves or {})
+    for name, weight in pose.items():
         steps = {float(w): target for w, target in in_betweens.get(name, {}).items()}
         stops = [0.0, *sorted(steps), 1.0]
         targets = {**steps, 1.0: name}
@@ -28,7 +31,18 @@ def expand_weights(pose_weights, in_betweens, correctives):
     for target, drivers in correctives.items():
         product = 1.0
         for driver in drivers:
-            product *= min(max(pose_weights.get(driver, 0.0), 0.0), 1.0)
+            product *= min(max(drive.get(driver, 0.0), 0.0), 1.0)
         if product != 0.0:
             result[target] = result.get(target, 0.0) + product
     return result
+
+
+def _halved(pose_weights, halves):
+    """The weights with sums given to their halves, and the weights that drive correctives."""
+    pose = dict(pose_weights)
+    for name, parts in halves.items():
+        weight = pose.pop(name, 0.0)
+        for part in parts if weight else ():
+            pose[part] = pose.get(part, 0.0) + weight
+    sums = {name: sum(pose.get(part, 0.0) for part in parts) / len(parts) for name, parts in halves.items()}
+    return pose, pose | sums

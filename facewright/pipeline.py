@@ -12,9 +12,10 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
-from facewright.contact import EyeShapes, solve_eyes
+from facewright.contact import Targets, find_jaw, hold_neck, part_lips, solve_eyes, solve_mouth
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
+from facewright.evaluate.rig import measure_rig
 from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
 from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, build_rig, find_irises, fit_parts
@@ -61,8 +62,8 @@ class JobOptions:
     iris          pattern of the irises, one of parts.PATTERNS; their colour is the scan's where it shows them
     landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
     formats       what to write: glb, obj
-    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": in-betweens ("name@0.5")
-                  and pair correctives ("a+b") too. rig/ always has all of them
+    shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": left and right halves in
+                  place of their sums, in-betweens ("name@0.5") and pair correctives ("a+b"). rig/ always has all
     jobs          threads inside the job; the result does not depend on it
     from_stage    run this stage and all after it again, whatever is cached
     """
@@ -170,9 +171,9 @@ def _run_job(run, path, output, options, inputs, template, folder):
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, scan, face, template)
-    shapes = _transfer(run, face, template)
+    shapes, figures = _transfer(run, face, template, options.jobs)
     maps = _bake(run, scan, face, options)
-    report = _write(run, scan, face, shapes, maps, (clean_stats, pose_info), output, options)
+    report = _write(run, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
     report["reused"] = run.reused
     report["peak_memory_mb"] = peak_memory_mb()
@@ -228,28 +229,50 @@ def _register(run, scan, landmarks, placed, template, folder, options):
 
 def _parts(run, scan, face, template):
     def work():
-        return pack_face(fit_parts(face, irises=find_irises(scan, face)))
+        return pack_face(part_lips(fit_parts(face, irises=find_irises(scan, face))))
 
     arrays, info = run.stage("04-parts", work)
     return unpack_face(arrays, info, template)
 
 
-def _transfer(run, face, template):
+def shapes_of(face, jobs=1):
+    """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
+    skin = solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))), jobs=jobs)
+    return _with_riders(face, skin)
+
+
+def rig_from_face(face, maps=None, jobs=1):
+    """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
+    return _assembled(face, shapes_of(face, jobs), maps)
+
+
+def _transfer(run, face, template, jobs):
     def work():
-        eyes = _with_riders(face, solve_eyes(face, transfer_shapes(face)))
-        info = {"names": list(template.shape_names), "extras": list(eyes.extras)}
+        targets = shapes_of(face, jobs)
+        bare = _assembled(face, targets, options=AssemblyOptions(eyes=None))
+        info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
-        info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in eyes.in_betweens.items()]
-        info["correctives"] = [[name, list(drivers)] for name, drivers in eyes.correctives.items()]
-        return {"deltas": eyes.deltas, "extras": np.array(list(eyes.extras.values()))}, info
+        info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in targets.in_betweens.items()]
+        info["correctives"] = [[name, list(drivers)] for name, drivers in targets.correctives.items()]
+        info["figures"] = plain(measure_rig(bare))
+        return {"deltas": targets.deltas, "extras": np.array(list(targets.extras.values()))}, info
 
     arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
-    return EyeShapes(
+    targets = Targets(
+        tuple(info["names"]),
         arrays["deltas"],
         dict(zip(info["extras"], arrays["extras"])),
         {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"]},
         {name: tuple(drivers) for name, drivers in info["correctives"]},
     )
+    return targets, info["figures"]
+
+
+def _assembled(face, targets, maps=None, options=None):
+    """The Rig with the jaw's bone at the hinge that jawOpen turns about."""
+    rig = build_rig(face, targets.deltas, maps, options, targets)
+    jaw = find_jaw(face, targets.delta("jawOpen")) if "jawOpen" in targets.names else None
+    return rig if jaw is None else jaw.on_rig(rig)
 
 
 def _with_riders(face, shapes):
@@ -271,15 +294,14 @@ def _bake(run, scan, face, options):
     return arrays
 
 
-def _write(run, scan, face, shapes, maps, found, output, options):
+def _write(run, scan, face, shapes, figures, maps, found, output, options):
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
-        looks = AssemblyOptions(eyes=EyeLook(pattern=options.iris))
-        rig = build_rig(face, shapes.deltas, maps, looks, eyes=shapes)
+        rig = _assembled(face, shapes, maps, AssemblyOptions(eyes=EyeLook(pattern=options.iris)))
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
-        carried = rig if options.shapes == "full" else rig.plain()
-        report = plain(build_report(scan, face, carried, *found))
+        carried = rig.full() if options.shapes == "full" else rig.plain()
+        report = plain(build_report(scan, face, carried, *found) | figures)
         earlier = run.store.last_info("07-write").get("files", {})
         with output.workshop() as folder:
             write_results(rig, maps, scan, face, folder, options)
@@ -296,7 +318,7 @@ def _write(run, scan, face, shapes, maps, found, output, options):
 def write_results(rig, maps, scan, face, folder, options):
     """Every file of a result but report.json and stages/."""
     plain_rig = rig.plain()
-    carried = rig if options.shapes == "full" else plain_rig
+    carried = rig.full() if options.shapes == "full" else plain_rig
     if "glb" in options.formats:
         write_gltf(carried, folder / "rig.glb")
     if "obj" in options.formats:
@@ -304,7 +326,7 @@ def write_results(rig, maps, scan, face, folder, options):
     write_credits(rig, folder / "CREDITS.txt")
     write_rig(rig, folder / "rig")
     write_textures(maps, folder / "textures", describe_maps(face, maps))
-    write_preview(plain_rig, scan, face, folder / "preview.png", options.jobs)
+    write_preview(rig, scan, face, folder / "preview.png", options.jobs)
 
 
 def _rig_to_scan(scan):

@@ -68,6 +68,9 @@ def small_rig():
         {"copyright": "nobody", "credits": ["made for tests"], "T_rig_to_scan": np.eye(4).tolist(), "depth_mm": 1 / 3},
         {"jawOpen": {0.5: "mouthClose"}},
         {"tongueOut": ("jawOpen", "mouthClose")},
+        {"mouthShrugUpper": ("mouthShrugUpperLeft", "mouthShrugUpperRight")},
+        {"lips_open": {"jawOpen": 1.0, "mouthClose": 1.0}},
+        {"viseme_aa": {"jawOpen": 0.5}},
     )
 
 

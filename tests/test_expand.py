@@ -39,18 +39,28 @@ def test_products_and_clipping():
     assert found["blink+squint"] == 0.5 and "all" not in found and found["squint"] == 2.0
 
 
+HALVES = {"jaw": ("jawLeft", "jawRight")}
+
+
+def test_a_sum_is_given_to_its_halves_and_drives_as_their_mean():
+    found = expand_weights({"jaw": 0.5, "jawLeft": 0.25, "blink": 1.0}, {}, {"blink+jaw": ("blink", "jaw")}, HALVES)
+    assert found == {"jawLeft": 0.75, "jawRight": 0.5, "blink": 1.0, "blink+jaw": 0.625}
+
+
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
 def test_the_javascript_twin_says_the_same():
     rng = np.random.default_rng(0)
     poses = [dict(zip(("blink", "squint", "jaw", "smile"), rng.uniform(-0.2, 1.2, 4))) for _ in range(50)]
-    poses += [{"blink": 0.5}, {"jaw": 0.25, "blink": 1.0}, {}]
+    poses += [{"blink": 0.5}, {"jaw": 0.25, "blink": 1.0}, {}, {"jawLeft": 0.5, "squint": 1.0, "blink": 0.7}]
     code = (
         f"import {{ expandWeights }} from {json.dumps(TWIN.as_uri())};"
-        f"const [poses, steps, pairs] = {json.dumps([poses, STEPS, PAIRS])};"
-        "console.log(JSON.stringify(poses.map((pose) => expandWeights(pose, steps, pairs))));"
+        f"const [poses, steps, pairs, halves] = {json.dumps([poses, STEPS, PAIRS, HALVES])};"
+        "const both = (pose) => [expandWeights(pose, steps, pairs), expandWeights(pose, steps, pairs, halves)];"
+        "console.log(JSON.stringify(poses.map(both)));"
     )
     run = subprocess.run(["node", "--input-type=module", "-e", code], capture_output=True, text=True, check=True)
-    for pose, theirs in zip(poses, json.loads(run.stdout)):
-        ours = expand_weights(pose, STEPS, PAIRS)
-        assert ours.keys() == theirs.keys()
-        assert all(ours[name] == pytest.approx(theirs[name], abs=1e-12) for name in ours)
+    for pose, answers in zip(poses, json.loads(run.stdout)):
+        for theirs, halves in zip(answers, (None, HALVES)):
+            ours = expand_weights(pose, STEPS, PAIRS, halves)
+            assert ours.keys() == theirs.keys()
+            assert all(ours[name] == pytest.approx(theirs[name], abs=1e-12) for name in ours)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1] / "facewright"
-BASE = {"data", "conventions", "errors", "mesh", "solve"}
+BASE = {"data", "conventions", "errors", "mesh", "solve", "working_set"}
 ALLOWED = {
     "mesh": {"errors", "conventions", "solve"},
     "solve": {"errors"},
@@ -17,7 +17,7 @@ ALLOWED = {
     "scan": BASE,
     "transfer": BASE,
     "register": BASE | {"scan", "transfer"},
-    "contact": BASE | {"transfer"},
+    "contact": BASE | {"transfer", "expand"},
     "parts": BASE | {"transfer"},
     "bake": BASE,
     "evaluate": BASE | {"expand"},

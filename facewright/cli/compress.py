@@ -5,12 +5,14 @@ facewright compress TEXTURES/ --neutral neutral.png --mesh neutral.obj --out pac
 
 from __future__ import annotations
 
-import shutil
+import re
 import sys
+import time
 
 from facewright.errors import InputError
 
 HELP = "compress expression textures (FaceZip)"
+UNITS = {"": 1, "B": 1, "KB": 1e3, "MB": 1e6, "GB": 1e9, "KIB": 2**10, "MIB": 2**20, "GIB": 2**30}
 
 
 def add_arguments(parser):
@@ -22,62 +24,229 @@ def add_arguments(parser):
     parser.add_argument("--method", choices=("refined", "paper"), default="refined", help="default: refined")
     parser.add_argument("--masks", type=int, default=53, help="masks of --method paper (default: 53)")
     parser.add_argument("--textures", type=int, default=4, help="difference textures (default: 4)")
+    parser.add_argument(
+        "--budget", metavar="SIZE", help="for example 8MB: as many difference textures as fit in memory"
+    )
     parser.add_argument("--region", metavar="IMAGE", help="where --method paper samples its masks")
     parser.add_argument("--keep", action="append", default=[], metavar="NAME", help="store this texture exactly")
     parser.add_argument("--priority", metavar="IMAGE", help="grey image: white counts ten times as much as black")
+    parser.add_argument(
+        "--examples", metavar="CSV", help="weights of example-based shapes: rows textures, columns shapes"
+    )
+    parser.add_argument(
+        "--also",
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("NAME", "FOLDER", "NEUTRAL"),
+        help="another map of the same expressions (specular, displacement ...), with shared weights where that pays",
+    )
+    parser.add_argument("--align", action="store_true", help="warp textures that lie off the neutral back onto it")
+    parser.add_argument("--ktx2", choices=("bc7", "astc", "none"), default="bc7", help="KTX2 beside PNG (default: bc7)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(options):
-    """Read, compress, write; the folder appears whole."""
-    from facewright.compress import FacezipOptions, facezip
-    from facewright.compress.files import list_textures, read_mask, read_texture, read_uv_mesh, write_packed
+    """Read, compress, write; the set appears whole."""
+    from facewright.compress import FacezipOptions, facezip_maps
+    from facewright.compress.files import read_examples, read_mask, read_texture, read_uv_mesh
+    from facewright.compress.folder import choose_ktx2, publishing, write_packed
+    from facewright.compress.packed import with_examples
     from facewright.output import OutputFolder
 
     if options.masks < 1:
         raise InputError(f"compress: --masks {options.masks}; at least 1 is needed")
-    paths = list_textures(options.textures_folder, options.neutral)
+    budget = None if options.budget is None else parse_size(options.budget)
+    sources = list_maps(options)
+    names = list(next(iter(sources.values()))[1])
     neutral, mesh = read_texture(options.neutral), read_uv_mesh(options.mesh)
     region = None if options.region is None else read_mask(options.region, neutral.shape[:2]) > 0.5
     priority = None if options.priority is None else 1 + 9 * read_mask(options.priority, neutral.shape[:2])
-    chosen = FacezipOptions(method=options.method, textures=options.textures, masks=options.masks)
+    examples = None if options.examples is None else read_examples(options.examples, names)
+    chosen = FacezipOptions(options.method, options.textures, options.masks, budget=budget)
+    reader = _Reader(sources, mesh, options.align)
     output = OutputFolder(options.out)
     output.make()
     try:
-        packed = facezip(
-            neutral,
-            lambda n: read_texture(paths[n]),
-            names=[p.stem for p in paths],
+        packed = facezip_maps(
+            {name: (reader.neutral(name), reader.of(name)) for name in sources},
+            names,
             mesh=mesh,
             region=region,
             priority=priority,
             keep=options.keep,
             options=chosen,
-            progress=None if options.quiet else _Progress(),
+            progress=None if options.quiet else Progress(),
         )
-        with output.workshop() as folder:
-            write_packed(packed, folder)
-            output.publish(folder)
+        results = packed
+        if examples is not None:
+            results = {name: with_examples(each, *examples) for name, each in packed.items()}
+        with publishing(options.out) as folder:
+            ktx2, missing = choose_ktx2(options.ktx2)
+            started = time.perf_counter()
+            about = write_packed(results, folder, ktx2)
+            written = time.perf_counter()
+            notes = [missing, *write_previews(results, folder, reader, names, examples)]
     except BaseException:
         output.remove_what_is_new()
         raise
-    shutil.rmtree(output.stages, ignore_errors=True)
-    worst = max(packed.report["rmse"], key=packed.report["rmse"].get)
-    rmse, size = packed.report["rmse"], packed.memory_bytes() / 1e6
-    worst = max(rmse, key=rmse.__getitem__)
-    print(f"{len(paths)} textures in {size:.1f} MB, raw {neutral.nbytes * (len(paths) + 1) / 1e6:.1f}: {options.out}")
-    print(f"RMSE {packed.report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
+    print_summary(packed, about, reader, examples, results)
+    print(f"files {written - started:.1f} s, preview {time.perf_counter() - written:.1f} s: {options.out}")
+    for note in filter(None, [*reader.notes(options.align), *notes]):
+        print(note)
 
 
-class _Progress:
-    """The share done and the time left, on standard error."""
+def list_maps(options):
+    """dict map -> (path of its neutral, dict expression -> path); all maps have the same expressions."""
+    from facewright.compress.files import list_textures
+
+    found = {"color": (options.neutral, options.textures_folder)}
+    for name, folder, neutral in options.also:
+        if name in found:
+            raise InputError(f"compress: two maps are called {name!r}; give every --also a name of its own")
+        found[name] = (neutral, folder)
+    maps = {}
+    for name, (neutral, folder) in found.items():
+        paths = {path.stem: path for path in list_textures(folder, neutral)}
+        first = next(iter(maps.values()), (None, paths))[1]
+        if set(paths) != set(first):
+            odd = sorted(set(paths) ^ set(first))[0]
+            raise InputError(f"compress: {odd} is not in both {options.textures_folder} and {folder}; name them alike")
+        maps[name] = (neutral, {stem: paths[stem] for stem in first})
+    return maps
+
+
+def parse_size(text):
+    """Bytes of "8MB", "500 KiB" or "1e7"."""
+    match = re.fullmatch(r"\s*([0-9.]+(?:e[0-9]+)?)\s*([a-zA-Z]*)\s*", text)
+    try:
+        return int(float(match[1]) * UNITS[match[2].upper()])
+    except (TypeError, ValueError, KeyError):
+        raise InputError(f"compress: --budget {text!r} is no size; write for example 8MB or 500KiB") from None
+
+
+def write_previews(packed, folder, reader, names, examples):
+    """preview.html of the first map, preview_NAME.html of the others; returns sentences on what is left out."""
+    import numpy as np
+
+    from facewright.compress.folder import cannot_write
+    from facewright.compress.preview import preview_missing, preview_page
+    from facewright.write.files import file_name
+
+    notes = []
+    mix = None if examples is None else np.linalg.pinv(examples[1])
+    for number, (name, one) in enumerate(packed.items()):
+        missing = preview_missing(one)
+        if missing:
+            notes.append(missing)
+            continue
+        page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", mix=mix)
+        try:
+            (folder / ("preview.html" if number == 0 else f"preview_{file_name(name)}.html")).write_text(
+                page, encoding="utf-8"
+            )
+        except OSError as error:
+            raise cannot_write(folder, error) from error
+    return notes
+
+
+def print_summary(packed, about, reader, examples, results):
+    """Bytes and errors, a line a map."""
+    size = about["bytes"]
+    count = len(next(iter(packed.values())).names)
+    raw = sum(one.neutral.nbytes * (count + 1) for one in packed.values()) / 1e6
+    print(f"{count} textures: {size['memory'] / 1e6:.2f} MB in memory, {size['png'] / 1e6:.2f} as PNG, raw {raw:.1f}")
+    if "ktx2" in size:
+        print(f"KTX2 with mip-maps: {size['ktx2'] / 1e6:.2f} MB on disk, {size['memory_ktx2'] / 1e6:.2f} in GPU memory")
+    for name, one in packed.items():
+        rmse, report = one.report["rmse"], one.report
+        worst = max(rmse, key=rmse.__getitem__)
+        print(f"{name}: {len(one.textures)} difference textures, {sum(report['seconds'].values()):.1f} s")
+        print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
+        if "mean_rmse_shared" in report:
+            pair = (
+                f"RMSE {report['mean_rmse_shared']:.2f} with shared weights, {report['mean_rmse_alone']:.2f} with own"
+            )
+            print(f"{name}: {pair}")
+    if examples is not None:
+        report = next(iter(results.values())).report
+        holds = "" if report["full_row_rank"] else "; the table has no full row rank, so shapes only come near (Eq. 10)"
+        print(f"{len(examples[0])} shapes, weights within {report['largest_weight_error']:.4f} of the textures'{holds}")
+
+
+class _Reader:
+    """Reads textures of every map, and warps those that lie off the neutral by the shift of the first map."""
+
+    def __init__(self, sources, mesh, align):
+        self.sources, self.mesh, self.align = sources, mesh, align
+        self.neutrals, self.shifts, self.covered = {}, {}, None
+
+    def neutral(self, name):
+        """The neutral of a map."""
+        from facewright.compress.files import read_texture
+
+        if name not in self.neutrals:
+            self.neutrals[name] = read_texture(self.sources[name][0])
+        return self.neutrals[name]
+
+    def of(self, name):
+        """Function n -> image of a map."""
+        paths = list(self.sources[name][1].values())
+        return lambda n: self._read(name, paths[n])
+
+    def _read(self, name, path):
+        from facewright.compress.align import align_texture
+        from facewright.compress.files import read_texture
+
+        image = read_texture(path)
+        if image.shape != self.neutral(name).shape:
+            return image  # facezip says what is wrong
+        shift = self._shift(path.stem, image if name == next(iter(self.sources)) else None)
+        return align_texture(image, shift) if self.align and shift is not None and shift.misaligned else image
+
+    def _shift(self, stem, image):
+        from facewright.compress.align import measure_shift
+        from facewright.compress.files import read_texture
+        from facewright.compress.masks import covered_texels
+
+        if stem not in self.shifts:
+            first = next(iter(self.sources))
+            neutral = self.neutral(first)
+            image = read_texture(self.sources[first][1][stem]) if image is None else image
+            if self.covered is None:
+                self.covered = covered_texels(self.mesh.uv, self.mesh.uv_faces, *neutral.shape[:2])
+            shift = measure_shift(neutral, image, self.covered) if image.shape == neutral.shape else None
+            if shift is not None and not (self.align and shift.misaligned):
+                shift = shift.without_flow()
+            self.shifts[stem] = shift
+        return self.shifts[stem]
+
+    def notes(self, align):
+        """Sentences on misaligned textures."""
+        off = {stem: shift for stem, shift in self.shifts.items() if shift is not None and shift.misaligned}
+        if not off:
+            return []
+        worst = max(off, key=lambda stem: off[stem].p95)
+        told = f"{len(off)} textures lie off the neutral, {worst} by up to {off[worst].p95:.1f} texels"
+        return [f"{told}: warped back" if align else f"{told}; --align warps them back"]
+
+
+class Progress:
+    """The stage, the share done and the time left, on standard error."""
 
     def __init__(self):
-        import time
+        self.stage, self.started = None, 0.0
 
-        self.clock, self.started = time.perf_counter, time.perf_counter()
-
-    def __call__(self, share):
-        left = (self.clock() - self.started) * (1 - share) / share
-        sys.stderr.write(f"\rrefining {share:4.0%}, about {left:.0f} s left " + ("\n" if share >= 1 else ""))
+    def __call__(self, stage, share):
+        now = time.perf_counter()
+        if stage != self.stage:
+            if self.stage is not None:
+                sys.stderr.write("\n")
+            self.stage, self.started, self.first = stage, now, share
+        # The first report of a stage starts its clock.
+        done = share - self.first
+        left = f", about {(now - self.started) * (1 - share) / done:.0f} s left" if done > 0 else ""
+        sys.stderr.write(f"\r{stage} {share:4.0%}{left}        " + ("\n" if share >= 1 else ""))
+        if share >= 1:
+            self.stage = None
         sys.stderr.flush()

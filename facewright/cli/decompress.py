@@ -16,6 +16,7 @@ def add_arguments(parser):
     """Arguments of `facewright decompress`."""
     parser.add_argument("packed", metavar="FOLDER", help="a folder that `facewright compress` wrote")
     parser.add_argument("--weights", required=True, metavar="NAME=W,...", help="for example smile=0.7,browDown=1")
+    parser.add_argument("--map", metavar="NAME", help="which map of a set with several (default: the first)")
     parser.add_argument("--out", required=True, metavar="PNG", help="the image to write")
 
 
@@ -24,10 +25,10 @@ def run(options):
     from PIL import Image
 
     from facewright.compress import facezip_decode
-    from facewright.compress.files import read_packed
+    from facewright.compress.folder import read_packed
     from facewright.write.files import replace_file
 
-    image = facezip_decode(read_packed(options.packed), parse_weights(options.weights))
+    image = facezip_decode(read_packed(options.packed, options.map), parse_weights(options.weights))
     stream = io.BytesIO()
     Image.fromarray(image[:, :, 0] if image.shape[2] == 1 else image).save(stream, "PNG")
     replace_file(options.out, stream.getvalue())

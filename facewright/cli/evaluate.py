@@ -2,8 +2,10 @@
 
   facewright evaluate result/
   facewright evaluate result/ --scan head.obj     # measure the rig's neutral against the scan again
-  facewright evaluate rig result/                 # bars of the finished rig: lids and eyeballs
+  facewright evaluate rig result/                 # all bars of the finished rig: eyes, mouth, shapes, blends
+  facewright evaluate rig any.glb                 # the same of any GLB with named shapes, as far as it can be known
   facewright evaluate result/ --shapes            # every shape: size, folded faces, torn edges, new crossings
+  facewright evaluate compression TEXTURES/ --neutral neutral.png --mesh neutral.obj --out figures/   # FaceZip
 
 Distances are in millimetres; docs/evaluate.md defines every figure.
 """
@@ -11,27 +13,45 @@ Distances are in millimetres; docs/evaluate.md defines every figure.
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 from facewright.errors import InputError
 
 HELP = "print the figures of a finished job"
 COLUMNS = ("mean", "rms", "p95", "max", "left_out")
+COLUMN_WIDTHS = (("full", 9), ("plain 52", 9), ("bar", 10), ("bar of 52", 10))
 
 
 def add_arguments(parser):
     """Arguments of `facewright evaluate`."""
-    parser.add_argument("result", nargs="+", metavar="[rig] FOLDER", help="a folder that `facewright rig` wrote")
+    parser.add_argument(
+        "result",
+        nargs="+",
+        metavar="[rig|compression] FOLDER",
+        help="a folder that `facewright rig` wrote, a GLB (rig), or textures (compression)",
+    )
+    parser.add_argument(
+        "--blends", type=int, default=1000, metavar="N", help="evaluate rig: random blends to try (default: 1000)"
+    )
     parser.add_argument("--scan", metavar="FILE", help="the scan that the rig was made from")
     parser.add_argument("--shapes", action="store_true", help="measure every shape too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.add_argument("--neutral", metavar="IMAGE", help="compression: the neutral texture")
+    parser.add_argument("--mesh", metavar="OBJ", help="compression: the mesh with UVs that the textures belong to")
+    parser.add_argument("--out", metavar="FOLDER", help="compression: folder for tables, CSV and plots")
 
 
 def run(options):
     """Collect the figures and print them."""
     *what, folder = options.result
+    if what == ["compression"]:
+        from facewright.cli.evaluate_compression import evaluate
+
+        evaluate(folder, options)
+        return
     if what == ["rig"]:
-        print_eyes(Path(folder), options.json)
+        print_bars(Path(folder), options.blends, options.json)
         return
     if what:
         raise InputError(f"evaluate: one folder at a time, got {len(options.result)}; or: evaluate rig FOLDER")
@@ -52,30 +72,51 @@ def run(options):
         print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
 
 
-def print_eyes(folder, as_json):
-    """The bars of lids and eyeballs: with in-betweens and correctives, and the plain 52 beside them."""
-    from facewright.evaluate.eyes import DEPTH_BAR_MM, GAP_BAR_MM, measure_eyes
+def print_bars(path, blends, as_json):
+    """Every bar of a rig: with in-betweens and correctives, and the plain 52 beside it."""
+    from facewright.evaluate.bars import rig_rows
+    from facewright.read.gltf_rig import read_gltf_rig
     from facewright.write.rig import read_rig
 
-    eyes = measure_eyes(read_rig(folder / "rig"))
+    rig = read_gltf_rig(path) if path.is_file() else read_rig(path / "rig")
+    rows = rig_rows(rig, blends)
     if as_json:
-        print(json.dumps(eyes, indent=1))
+        print(json.dumps([asdict(row) | {"met": row.met} for row in rows], indent=1))
         return
-    print(
-        f"eyeball radius {eyes['radius_mm']:.2f} mm (11.5 to 12.5), lid gap at rest {eyes['lid_gap_mm']:.2f} mm (0.3)"
-    )
-    print("  ".join(["pose".ljust(28), "figure".ljust(10), "bar".rjust(5), "full".rjust(6), "plain".rjust(6)]))
-    for pose, figures in eyes["poses"].items():
-        for key, bar in (("depth_mm", DEPTH_BAR_MM), ("margins_mm", GAP_BAR_MM)):
-            if key in figures:
-                full, plain = figures[key]
-                verdict = "" if full <= bar else "  missed"
-                print(f"{pose.ljust(28)}  {key.ljust(10)}  {bar:5.2f}  {full:6.2f}  {plain:6.2f}{verdict}")
+    if not rig.regions:
+        print("no regions or feature lines in this file: folds and tears count the inside of the mouth too")
+    print_rows(rows)
+
+
+def print_rows(rows):
+    """A table of evaluate.rows.Row, and how many bars are met."""
+    wide = [max((len(getattr(row, name)) for row in rows), default=0) for name in ("group", "pose", "figure")]
+    head = ("group".ljust(wide[0]), "pose".ljust(wide[1]), "figure".ljust(wide[2]))
+    print("  ".join([*head, *(text.rjust(width) for text, width in COLUMN_WIDTHS)]))
+    for row in rows:
+        names = (row.group.ljust(wide[0]), row.pose.ljust(wide[1]), row.figure.ljust(wide[2]))
+        values = (_number(row.full), _number(row.plain), _range(row.bar), _range(row.plain_bar))
+        cells = [text.rjust(width) for text, (_, width) in zip(values, COLUMN_WIDTHS)]
+        print("  ".join([*names, *cells, "" if row.met else "missed"]).rstrip())
+    judged = [row for row in rows if row.has_bar]
+    print(f"{sum(row.met for row in judged)} of {len(judged)} bars met")
+
+
+def _number(value):
+    return "-" if value is None else str(value) if isinstance(value, int) else f"{value:.3f}"
+
+
+def _range(bar):
+    if bar == (None, None):
+        return "-"
+    least, most = ("" if end is None else f"{end:g}" for end in bar)
+    return f"{least}..{most}"
 
 
 def collect(folder, scan_file=None, shapes=False):
     """dict: report, neutral, and if asked rig_to_scan and shapes."""
-    from facewright.evaluate.rig import measure_neutral, measure_rig_distances, measure_shapes
+    from facewright.evaluate.rig import measure_neutral, measure_rig_distances
+    from facewright.evaluate.shapes import measure_shapes
     from facewright.write.rig import read_rig
 
     rig = read_rig(folder / "rig")

@@ -19,7 +19,10 @@ from facewright.conventions import MM_PER_UNIT
 HELP = "make a rig from one head scan"
 IRIS_PATTERNS = ("fibres", "crypts", "furrows", "flower", "burst", "speckled")
 UPS = ("x", "y", "z", "-x", "-y", "-z")
-SHAPES_HELP = "apple: exactly the 52 ARKit shapes; full: in-betweens (name@0.5) and pair correctives (a+b) too"
+SHAPES_HELP = (
+    "apple: exactly the 52 ARKit shapes; full: left and right halves of the shapes that move both sides, in-betweens "
+    "(name@0.5) and pair correctives (a+b)"
+)
 
 
 def add_job_arguments(parser):

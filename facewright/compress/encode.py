@@ -3,42 +3,43 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 import time
-from dataclasses import dataclass
-from pathlib import Path
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from facewright.compress.masks import build_masks, covered_texels
-from facewright.compress.packed import Packed, quantise
-from facewright.compress.published import (
-    PermutationSearch,
-    centroid_matrix,
-    cluster_fragments,
-    coarse_grams,
-    pair_costs,
-    published_maps,
+from facewright.compress.masks import covered_texels
+from facewright.compress.packed import Packed, textures_within
+from facewright.compress.published import best_published
+from facewright.compress.refine import gram_matrix, pca_weights, refine
+from facewright.compress.store import (
+    measure_tiles,
+    root_mean,
+    store_solution,
 )
-from facewright.compress.refine import Pass, gram_matrix, pca_weights, refine
-from facewright.compress.tiles import TEXELS, Grid, TextureTiles
+from facewright.compress.tiles import TextureTiles, scratch_file
 from facewright.errors import InputError
 
 # Above this, tiles lie in a file instead of memory.
 SCRATCH_BYTES = 3_000_000_000
+# What a map's error may grow by when it shares weights; its own would cost N/16 bytes a texel.
+SHARED_MAY_LOSE = 0.1
 
 
 @dataclass(frozen=True)
 class FacezipOptions:
     """Options of facezip().
 
-    method      "refined", or "paper" for the published one
-    textures    number of difference textures, 1 to 8 (paper: 2 to 5)
+    method      "refined", "paper" for the published one, or "pca" (constant weights, for comparison)
+    textures    number of difference textures, 1 to 8 (paper: 2 to 5); with a budget the most that it may choose
     masks       number of masks of the published method
-    iterations  passes of the refinement; 15 reach what 25 do within 3 %
+    iterations  passes of the refinement; on 20 unrelated faces 15 leave 3.06, 25 3.00, 40 2.94
     seed        of the samples and searches
     permute     False leaves the published permutation out (for comparison)
+    budget      bytes in memory, uncompressed: the number of difference textures that fits (and, of the published
+                method, the best of some counts of masks)
     """
 
     method: str = "refined"
@@ -47,6 +48,7 @@ class FacezipOptions:
     iterations: int = 15
     seed: int = 0
     permute: bool = True
+    budget: int | None = None
 
 
 def facezip(
@@ -65,48 +67,173 @@ def facezip(
     """Compress aligned expression textures (FaceZip, Eq. 1-6, and beyond it a joint refinement).
 
     neutral   (h, w), (h, w, 1), (h, w, 3) or (h, w, 4), uint8 or uint16; sRGB or linear, blended as stored
-    textures  N images like it: a list, or a function n -> image with names given (each is asked for twice)
+    textures  N images like it: a list, or a function n -> image with names given (each is asked for once, in order)
     mesh      vertices (n, 3) mm, faces, uv (v up), uv_faces; tells which texels count; the paper's masks need it
     covered   (h, w) bool instead of what the mesh covers
     region    (h, w) bool: where the published method samples its masks
     priority  (h, w) >= 0: how much an error counts there; 1 is usual
     keep      names of textures that are stored exactly; one difference texture each
-    returns   Packed
-    raises    InputError where sizes or depths differ, or there are fewer textures than clusters (method paper)
+    progress  function (stage, share done)
+    returns   Packed; its report holds RMSE, seconds and the stages' times
+    raises    InputError where sizes or depths differ, there are fewer textures than clusters (method paper), or a
+              budget is too small
     """
-    options = options or FacezipOptions()
-    started = time.perf_counter()
-    neutral = _as_image(neutral, "neutral")
     fetch = textures if callable(textures) else (lambda n: textures[n])
     names = tuple(names) if names is not None else tuple(f"texture{n}" for n in range(len(textures)))
+    rest = {"mesh": mesh, "covered": covered, "region": region, "priority": priority, "keep": keep}
+    return _compress({"color": (neutral, fetch)}, names, options, progress, **rest)["color"]
+
+
+def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest):
+    """Compress several maps of the same expressions (albedo, specular, displacement ...), with one set of weights
+    where that pays.
+
+    maps    dict name -> (neutral, function n -> image) as facezip() takes them, all of one size; depths may differ
+    names   of the N expressions
+    share   True or False; None shares where no map's error grows by more than SHARED_MAY_LOSE
+    rest    mesh, covered, region, priority, keep as in facezip()
+    returns dict name -> Packed; maps that share have the same weights array
+    """
+    options = options or FacezipOptions()
+    if options.budget is not None:
+        images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
+        k = textures_within(options.budget, images, len(names), options.textures)
+        options = replace(options, textures=k, budget=None)
+    if len(maps) == 1 or share is False:
+        return {
+            name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
+        }
+    together = _compress(maps, tuple(names), options, progress, **rest)
+    if share:
+        return together
+    alone = facezip_maps(maps, names, share=False, options=options, progress=progress, **rest)
+    errors = {name: (together[name].report["mean_rmse"], alone[name].report["mean_rmse"]) for name in maps}
+    pays = all(shared <= own * (1 + SHARED_MAY_LOSE) for shared, own in errors.values())
+    for packed in (together, alone):
+        for name in maps:
+            packed[name].report["mean_rmse_shared"], packed[name].report["mean_rmse_alone"] = errors[name]
+    return together if pays else alone
+
+
+def _compress(maps, names, options, progress, *, mesh=None, covered=None, region=None, priority=None, keep=()):
+    """dict name -> Packed of maps that share their weights."""
+    options = options or FacezipOptions()
+    progress = progress or (lambda stage, share: None)
+    clock = _Clock()
     if not names:
         raise InputError("compress: no textures; give at least one besides the neutral")
-    layers, unique = _find_equal(neutral, fetch, names)
-    k = options.textures
-    _check(options, names, unique, keep)
-    grid = Grid(*neutral.shape[:2])
-    if covered is None:
-        covered = (
-            np.ones(neutral.shape[:2], bool)
-            if mesh is None
-            else covered_texels(mesh.uv, mesh.uv_faces, grid.height, grid.width)
+    _check(options, names, keep)
+    neutrals = {name: _as_image(neutral, f"neutral of {name}") for name, (neutral, _) in maps.items()}
+    scale = _texel_scale(next(iter(neutrals.values())), mesh, covered, priority)
+    stack = _stacked(list(neutrals.values()))
+    levels = [np.iinfo(image.dtype).max for image in neutrals.values() for _ in range(image.shape[2])]
+    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as path:
+        tiles = TextureTiles(stack, len(names), scale, path, levels)
+        layers = _read(tiles, maps, neutrals, names, clock, progress)
+        if len(maps) > 1:
+            with clock.stage("solving"):
+                tiles.balance([image.shape[2] for image in neutrals.values()])
+        k = options.textures
+        if options.budget is not None:
+            k = textures_within(options.budget, list(neutrals.values()), tiles.count, options.textures)
+        if options.method == "paper" and tiles.count < k:
+            raise InputError(
+                f"compress: {tiles.count} different textures cannot form {k} clusters; "
+                "give more textures, a smaller --textures, or --method refined"
+            )
+        held = tuple(dict.fromkeys(layers[names.index(name)] for name in keep))
+        plain = priority is None and len(maps) == 1
+        with clock.stage("solving"):
+            encoded, errors = _encode(tiles, k, options, mesh, region, held, plain, progress)
+    report = {"method": options.method, "textures": k, **encoded.pop("report"), "seconds": clock.seconds}
+    report["covered_texels"] = int((scale > 0).sum())
+    return _split(encoded, errors, neutrals, names, np.array(layers), report)
+
+
+def _stacked(images):
+    """Images (h, w, C) side by side in their channels; 8 bits become 16 where depths differ."""
+    if len(images) == 1:
+        return images[0]
+    if any(image.shape[:2] != images[0].shape[:2] for image in images):
+        raise InputError("compress: the maps have different sizes; export all at one size")
+    if any(image.dtype == np.uint16 for image in images):
+        images = [image if image.dtype == np.uint16 else image.astype(np.uint16) * 257 for image in images]
+    return np.concatenate(images, axis=2)
+
+
+def _split(encoded, errors, neutrals, names, layers, report):
+    """dict name -> Packed of the channels of each map."""
+    result, first = {}, 0
+    for name, neutral in neutrals.items():
+        mine = slice(first, first + neutral.shape[2])
+        rmse = root_mean(errors[:, mine])
+        about = {**report, "rmse": {each: float(rmse[layer]) for each, layer in zip(names, layers)}}
+        about["mean_rmse"] = float(np.mean(list(about["rmse"].values())))
+        result[name] = Packed(
+            neutral=neutral,
+            textures=encoded["textures"][..., mine].astype(neutral.dtype, copy=False),
+            texture_step=encoded["texture_step"][:, mine],
+            texture_zero=encoded["texture_zero"][:, mine],
+            weights=encoded["weights"],
+            weight_step=encoded["weight_step"],
+            weight_zero=encoded["weight_zero"],
+            names=names,
+            layers=layers,
+            report=about,
         )
+        first = mine.stop
+    return result
+
+
+class _Clock:
+    """Seconds of every stage."""
+
+    def __init__(self):
+        self.seconds = {}
+
+    @contextmanager
+    def stage(self, name):
+        started = time.perf_counter()
+        yield
+        self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - started, 4)
+
+
+def _texel_scale(neutral, mesh, covered, priority):
+    """(h, w) float32: 0 where no triangle covers the texel, else the square root of its priority."""
+    if covered is None:
+        shape = neutral.shape[:2]
+        covered = np.ones(shape, bool) if mesh is None else covered_texels(mesh.uv, mesh.uv_faces, *shape)
     if not covered.any():
         raise InputError("compress: no texel is covered by the mesh; check its UVs")
     scale = covered.astype(np.float32)
     if priority is not None:
         scale *= np.sqrt(np.maximum(priority, 1e-4)).astype(np.float32)
-    with _scratch(neutral.nbytes * len(unique)) as path:
-        tiles = TextureTiles(neutral, (_as_image(fetch(n), names[n]) for n in unique), len(unique), scale, path)
-        held = tuple(unique.index(_first(layers, unique, names.index(name))) for name in keep)
-        encoded = _encode(tiles, k, options, mesh, region, held, progress)
-        report = {"method": options.method, "textures": k, **encoded.pop("report")}
-        errors = measure_tiles(tiles, covered, encoded)
-    report["rmse"] = {name: float(errors[layer]) for name, layer in zip(names, layers)}
-    report["mean_rmse"] = float(np.mean(list(report["rmse"].values())))
-    report["seconds"] = round(time.perf_counter() - started, 3)
-    report["covered_texels"] = int(covered.sum())
-    return Packed(neutral=neutral, names=names, layers=np.array(layers), report=report, **encoded)
+    return scale
+
+
+def _read(tiles, maps, neutrals, names, clock, progress):
+    """Cut all textures into tiles; equal ones once. Returns the layer of each."""
+    seen, layers = {}, []
+    for n, name in enumerate(names):
+        with clock.stage("reading"):
+            images = [_as_image(fetch(n), name) for _, fetch in maps.values()]
+        for image, neutral in zip(images, neutrals.values()):
+            if image.shape != neutral.shape or image.dtype != neutral.dtype:
+                (h, w, c), (nh, nw, nc) = image.shape, neutral.shape
+                raise InputError(
+                    f"compress: {name} has {w} x {h} pixels, {c} channels, {image.dtype}, but the neutral {nw} x {nh}, "
+                    f"{nc} channels, {neutral.dtype}; export all textures alike"
+                )
+        with clock.stage("tiling"):
+            image = _stacked(images)
+            key = hashlib.blake2b(np.ascontiguousarray(image)).digest()
+            if key not in seen:
+                seen[key] = len(seen)
+                tiles.put(seen[key], image)
+        layers.append(seen[key])
+        progress("reading", (n + 1) / len(names))
+    tiles.keep(len(seen))
+    return layers
 
 
 def _as_image(image, name):
@@ -117,85 +244,63 @@ def _as_image(image, name):
     return image
 
 
-def _find_equal(neutral, fetch, names):
-    """For every texture the layer of its weight map, and the first texture of every layer."""
-    seen, layers, unique = {}, [], []
-    for n, name in enumerate(names):
-        image = _as_image(fetch(n), name)
-        if image.shape != neutral.shape or image.dtype != neutral.dtype:
-            (h, w, c), (nh, nw, nc) = image.shape, neutral.shape
-            raise InputError(
-                f"compress: {name} has {w} x {h} pixels, {c} channels, {image.dtype}, but the neutral {nw} x {nh}, "
-                f"{nc} channels, {neutral.dtype}; export all textures alike"
-            )
-        key = hashlib.blake2b(np.ascontiguousarray(image)).digest()
-        if key not in seen:
-            seen[key] = len(unique)
-            unique.append(n)
-        layers.append(seen[key])
-    return layers, unique
-
-
-def _first(layers, unique, n):
-    return unique[layers[n]]
-
-
-def _check(options, names, unique, keep):
-    if options.method not in ("refined", "paper"):
-        raise ValueError(f"method {options.method!r}: refined or paper")
+def _check(options, names, keep):
+    if options.method not in ("refined", "paper", "pca"):
+        raise ValueError(f"method {options.method!r}: refined, paper or pca")
     if not 1 <= options.textures <= 8:
         raise InputError(f"compress: {options.textures} difference textures; 1 to 8 are possible")
     if options.method == "paper" and options.textures > 5:
         raise InputError("compress: --method paper searches among permutations of 5 textures at most; use refined")
-    if options.method == "paper" and len(unique) < options.textures:
-        raise InputError(
-            f"compress: {len(unique)} different textures cannot form {options.textures} clusters; "
-            "give more textures, a smaller --textures, or --method refined"
-        )
     missing = [name for name in keep if name not in names]
     if missing:
         raise InputError(f"compress: --keep {missing[0]}: there is no such texture; there are {', '.join(names[:12])}")
     if len(set(keep)) > options.textures:
         raise InputError(f"compress: {len(keep)} textures to keep, but only {options.textures} difference textures")
-    if keep and options.method == "paper":
+    if keep and options.method != "refined":
         raise InputError("compress: --keep works with --method refined only")
 
 
-class _scratch:
-    """A scratch file for tiles of so many bytes, or None where they fit memory."""
-
-    def __init__(self, size):
-        self.folder = tempfile.TemporaryDirectory(prefix="facezip-") if size > SCRATCH_BYTES else None
-
-    def __enter__(self):
-        return None if self.folder is None else os.fspath(Path(self.folder.name) / "tiles")
-
-    def __exit__(self, *_):
-        if self.folder is not None:
-            self.folder.cleanup()
-
-
-def _encode(tiles, k, options, mesh, region, held, progress):
+def _encode(tiles, k, options, mesh, region, held, plain, progress):
+    """What is stored, and the RMSE of every texture and channel; PCA is no measure unless plain."""
     if options.method == "paper":
-        return _encode_published(tiles, k, options, mesh, region)
+        return best_published(tiles, k, options, mesh, region, progress)
     gram = gram_matrix(tiles)
+    if options.method == "pca":
+        result = _store_pca(tiles, gram, k)
+        return result, measure_tiles(tiles, result)
     exact = _exact_basis(tiles, gram, k, held)
     if exact is not None:
-        return _store(tiles, exact, k, exact=True, report={"solution": "exact"})
+        result = store_solution(tiles, exact, k, exact=True, report={"solution": "exact"})
+        return result, measure_tiles(tiles, result)
     start = pca_weights(gram, k)
     if held:
         start[list(held)] = 0
         start[:, : len(held)] = 0
         start[list(held), range(len(held))] = 1
-    weights, _ = refine(tiles, start, iterations=options.iterations, keep=held, progress=progress)
-    result = _store(tiles, weights, k, held=held, report={"solution": "refined"})
-    float_pca = gram.trace() - np.sort(np.linalg.eigvalsh(gram))[::-1][:k].sum()
-    if not held and _squared(tiles, result) > float_pca:
-        constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
-        other = _store(tiles, constant, k, report={"solution": "pca"})
-        if _squared(tiles, other) < _squared(tiles, result):
-            return other
-    return result
+    share = partial(progress, "refining")
+    weights, _ = refine(tiles, start, iterations=options.iterations, keep=held, progress=share)
+    result = store_solution(tiles, weights, k, held=held, report={"solution": "refined"})
+    del weights
+    errors = measure_tiles(tiles, result)
+    if plain and not held and root_mean(errors).mean() > pca_rmse(tiles, gram, k).mean():
+        other = _store_pca(tiles, gram, k)
+        other_errors = measure_tiles(tiles, other)
+        if root_mean(other_errors).mean() < root_mean(errors).mean():
+            return other, other_errors
+    return result, errors
+
+
+def _store_pca(tiles, gram, k):
+    start = pca_weights(gram, k)
+    constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
+    return store_solution(tiles, constant, k, report={"solution": "pca"})
+
+
+def pca_rmse(tiles, gram, k):
+    """(N,) RMSE of every texture when the k leading components are kept in float, from the (N, N) Gram matrix."""
+    values, vectors = np.linalg.eigh(gram)
+    left = np.diag(gram) - (vectors[:, -k:] ** 2 * values[-k:]).sum(axis=1)
+    return np.sqrt(np.maximum(left, 0) / (max((tiles.scale > 0).sum(), 1) * tiles.channels))
 
 
 def _exact_basis(tiles, gram, k, held):
@@ -218,126 +323,3 @@ def _exact_basis(tiles, gram, k, held):
         solved[chosen] = np.eye(len(chosen))
         weights[:, : len(chosen)] = solved
     return np.broadcast_to(weights, (*tiles.grid.cells, n, k))
-
-
-def _store(tiles, weights, k, *, held=(), exact=False, report):
-    """Quantised weights, the difference textures that suit them best, and these quantised."""
-    weights = np.ascontiguousarray(weights.transpose(2, 0, 1, 3))  # (N, rows, columns, K)
-    codes, step, zero = _quantise_weights(weights)
-    stored = ((codes.astype(np.float32) - zero[:, None, None]) * step[:, None, None]).astype(np.float32)
-    # Few textures leave little noise to damp: a smaller ridge then costs no range.
-    ridge = (1e-6 if exact else 1e-4 if tiles.count <= 4 else 0.01) * tiles.count
-    d = Pass(tiles, k, held).textures(stored.transpose(1, 2, 0, 3), ridge)
-    parts = _quantise_textures(tiles, d, held=range(k) if exact else range(len(held)))
-    return _parts(parts, (codes, step, zero), report)
-
-
-def _parts(textures, weights, report):
-    keys = ("textures", "texture_step", "texture_zero", "weights", "weight_step", "weight_zero")
-    return {**dict(zip(keys, (*textures, *weights))), "report": report}
-
-
-def _quantise_weights(weights):
-    low, high = weights.min(axis=(1, 2)), weights.max(axis=(1, 2))
-    low, high = np.minimum(low, 0.0).astype(np.float64), np.maximum(high, 0.0).astype(np.float64)
-    codes, step, zero = quantise(weights, low[:, None, None], high[:, None, None], 255)
-    return codes, step[:, 0, 0], zero[:, 0, 0]
-
-
-def _quantise_textures(tiles, d, held=()):
-    """Codes (K, h, w, C) of D (h, w, K, C); all but held textures at their 99.99 percentile range."""
-    height, width, k, channels = d.shape
-    levels = np.iinfo(tiles.data.dtype).max
-    sample = d[:: max(1, height // 1024), :: max(1, width // 1024)].reshape(-1, k, channels)
-    sample = sample[(sample != 0).any(axis=(1, 2))]
-    sample = sample if len(sample) else np.zeros((1, k, channels), np.float32)
-    low, high = np.quantile(sample, 0.0001, axis=0), np.quantile(sample, 0.9999, axis=0)
-    for i in held:
-        low[i], high[i] = d[:, :, i].min(axis=(0, 1)), d[:, :, i].max(axis=(0, 1))
-    out = np.empty((k, height, width, channels), tiles.data.dtype)
-    steps, zeros = np.empty((k, channels)), np.empty((k, channels))
-    for i in range(k):
-        out[i], steps[i], zeros[i] = quantise(d[:, :, i], low[i], high[i], levels)
-    return out, steps, zeros
-
-
-def _encode_published(tiles, k, options, mesh, region):
-    if mesh is None:
-        raise InputError("compress: --method paper computes its masks on the mesh; give one with UVs")
-    masks, about = build_masks(mesh, tiles.grid, options.masks, seed=options.seed, region=region)
-    weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute)
-    n = tiles.count
-    work = Pass(tiles, k)
-    flat = np.ascontiguousarray(shares).reshape(-1, n, k)
-    d = np.empty((len(tiles), k, tiles.channels, TEXELS), np.float32)
-    for part in tiles.chunks():
-        rows = flat[work.corners[part]].transpose(0, 1, 3, 2).reshape(-1, 4 * k, n)
-        y = (rows @ tiles.differences(part)).reshape(-1, 4, k, tiles.channels, TEXELS)
-        scale = tiles.scale[part, None]
-        d[part] = (y * work.basis[:, None, None]).sum(axis=1) / np.where(scale > 0, scale, 1)
-    image = tiles.grid.join(d.reshape(len(d), -1, TEXELS)).reshape(tiles.grid.height, tiles.grid.width, k, -1)
-    stored = _quantise_weights(np.ascontiguousarray(weights.transpose(2, 0, 1, 3)))
-    report = {**about, "permutation_cost": cost, "solution": "published"}
-    return _parts(_quantise_textures(tiles, image), stored, report)
-
-
-def published_search(tiles, masks, k, seed=0):
-    """PermutationSearch of a set under masks (rows, columns, m), the labels and the centroids."""
-    _, grams = gram_matrix(tiles, blocks=True)
-    blocks, values = coarse_grams(tiles, grams, masks)
-    per_mask = np.tensordot(values.T**2, blocks, 1)
-    labels = cluster_fragments(per_mask, k, seed=seed)
-    centroids = centroid_matrix(labels, k)
-    return PermutationSearch(pair_costs(blocks, values, centroids)), labels, centroids
-
-
-def published_solution(tiles, masks, k, seed=0, permute=True):
-    """Weight maps, the shares that make the difference textures, and the permutation cost."""
-    search, labels, centroids = published_search(tiles, masks, k, seed)
-    state = search.solve(seed) if permute else np.zeros(len(labels), int)
-    chosen = search.permutations[state]
-    weights, shares = published_maps(masks, labels, centroids, chosen)
-    return weights, shares, float(search.cost(state[None])[0])
-
-
-def _predicted(tiles, encoded, part, textures, weights, work):
-    """(t, N, C, 64) 0-255 reconstruction of tiles from stored values, clipped."""
-    k = weights.shape[-1]
-    corner = weights[work.corners[part]].transpose(0, 2, 1, 3)  # (t, N, 4, K)
-    e = (textures[part][:, None] * work.basis[:, None, None]).reshape(len(corner), 4 * k, -1)
-    x = (corner.reshape(len(corner), -1, 4 * k) @ e).reshape(len(corner), -1, tiles.channels, TEXELS)
-    x += tiles.neutral[part, None] * np.float32(tiles.unit)
-    return np.clip(x, 0, 255, out=x)
-
-
-def _stored_tiles(tiles, encoded):
-    step, zero = encoded["texture_step"], encoded["texture_zero"]
-    d = [
-        tiles.grid.cut((image.astype(np.float32) - z.astype(np.float32)) * s.astype(np.float32))
-        for image, s, z in zip(encoded["textures"], step, zero)
-    ]
-    w = (encoded["weights"].astype(np.float32) - encoded["weight_zero"][:, None, None]) * encoded["weight_step"][
-        :, None, None
-    ]
-    n, k = w.shape[0], w.shape[-1]
-    flat = np.ascontiguousarray(w.transpose(1, 2, 0, 3).astype(np.float32)).reshape(-1, n, k)
-    return np.stack(d, axis=1), flat
-
-
-def measure_tiles(tiles, covered, encoded):
-    """(N,) RMSE of every texture on covered texels, 0-255, after storage, upsampling and clipping."""
-    textures, weights = _stored_tiles(tiles, encoded)
-    work = Pass(tiles, weights.shape[-1])
-    cover = tiles.grid.cut(covered[:, :, None].astype(np.float32))
-    total = np.zeros(tiles.count)
-    for part in tiles.chunks():
-        x = _predicted(tiles, encoded, part, textures, weights, work)
-        x -= tiles.data[part].astype(np.float32) * np.float32(tiles.unit)
-        x *= cover[part, None]
-        total += np.einsum("tncp,tncp->n", x, x, dtype=np.float64)
-    return np.sqrt(total / (covered.sum() * tiles.channels))
-
-
-def _squared(tiles, encoded):
-    covered = tiles.grid.join(tiles.scale)[:, :, 0] > 0
-    return float((measure_tiles(tiles, covered, encoded) ** 2).sum() * covered.sum() * tiles.channels)

@@ -1,23 +1,18 @@
-"""Texture sets from folders, packed sets to and from a folder of PNG and one JSON that names every channel."""
+"""Reading what a user has: folders of textures, meshes with UVs, masks, tables of example weights."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from facewright.compress.packed import Packed
-from facewright.compress.runtime import GLSL, HLSL
 from facewright.errors import InputError
 from facewright.read.images import MAX_PIXELS, decode_image
 from facewright.read.obj import read_obj
-from facewright.write.files import file_name
 
-FORMAT = "facezip-1"
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".tga", ".webp"}
 
 
@@ -98,99 +93,3 @@ def read_examples(path, names):
             f"{path}: needs a row of {len(shapes)} weights for every texture; look at {missing[:1] or names[0]}"
         )
     return shapes, np.array([table[name] for name in names])
-
-
-def write_packed(packed, folder):
-    """Write a Packed into an existing folder: neutral, differences, weights (PNG), facezip.json, shaders."""
-    folder = Path(folder)
-    k = len(packed.textures)
-    files = {"neutral.png": packed.neutral, **{f"difference{i}.png": packed.textures[i] for i in range(k)}}
-    layer_files = []
-    for layer, codes in enumerate(packed.weights):
-        first = packed.names[int(np.flatnonzero(packed.layers == layer)[0])]
-        names = []
-        for start in range(0, k, 4):
-            name = f"weights/{layer:03d}_{file_name(first)}" + (f"_{start // 4}" if k > 4 else "") + ".png"
-            padded = np.zeros((*codes.shape[:2], 4), np.uint8)
-            padded[:, :, : min(4, k - start)] = codes[:, :, start : start + 4]
-            files[name] = padded
-            names.append(name)
-        layer_files.append(names)
-    try:
-        (folder / "weights").mkdir(exist_ok=True)
-        for name, pixels in files.items():
-            Image.fromarray(np.squeeze(pixels, 2) if pixels.shape[2] == 1 else pixels).save(
-                folder / name, "PNG", compress_level=1
-            )
-        (folder / "facezip.glsl").write_text(GLSL, encoding="utf-8")
-        (folder / "facezip.hlsl").write_text(HLSL, encoding="utf-8")
-        (folder / "facezip.json").write_text(json.dumps(describe(packed, layer_files), indent=1), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{folder}: cannot write ({error.strerror}); free space or choose another --out") from error
-
-
-def describe(packed, layer_files):
-    """facezip.json as a dict."""
-    rows, columns = packed.weights.shape[1:3]
-    height, width, channels = packed.neutral.shape
-    return {
-        "format": FORMAT,
-        "size": [width, height],
-        "channels": "RGBA"[:channels] if channels > 1 else "R",
-        "bits": packed.neutral.dtype.itemsize * 8,
-        "colour_space": "values as in the input images; blended as stored, not linearised",
-        "meaning": "a code q stands for (q - zero) * step; differences in 0-255 units",
-        "neutral": "neutral.png",
-        "differences": [
-            {"file": f"difference{i}.png", "step": list(step), "zero": list(zero)}
-            for i, (step, zero) in enumerate(zip(packed.texture_step.tolist(), packed.texture_zero.tolist()))
-        ],
-        "weight_size": [columns, rows],
-        "weight_uv_scale": [width / (8 * columns), height / (8 * rows)],
-        "weights": [
-            {"files": names, "step": step, "zero": zero}
-            for names, step, zero in zip(layer_files, packed.weight_step.tolist(), packed.weight_zero.tolist())
-        ],
-        "expressions": {name: int(layer) for name, layer in zip(packed.names, packed.layers)},
-        "memory_bytes": packed.memory_bytes(),
-        "report": packed.report,
-    }
-
-
-def read_packed(folder):
-    """The Packed that write_packed wrote; reads no file outside the folder."""
-    folder = Path(folder)
-    try:
-        about = json.loads((folder / "facezip.json").read_text(encoding="utf-8"))
-        if about["format"] != FORMAT:
-            raise InputError(f"{folder}: facezip.json has format {about['format']!r}, expected {FORMAT!r}")
-        k = len(about["differences"])
-        neutral = read_texture(_inside(folder, about["neutral"]))
-        textures = np.stack([read_texture(_inside(folder, d["file"])) for d in about["differences"]])
-        weights = [
-            np.concatenate([read_texture(_inside(folder, f)) for f in w["files"]], axis=2)[:, :, :k]
-            for w in about["weights"]
-        ]
-        return Packed(
-            neutral=neutral,
-            textures=textures,
-            texture_step=np.array([d["step"] for d in about["differences"]]),
-            texture_zero=np.array([d["zero"] for d in about["differences"]]),
-            weights=np.stack(weights),
-            weight_step=np.array([w["step"] for w in about["weights"]]),
-            weight_zero=np.array([w["zero"] for w in about["weights"]]),
-            names=tuple(about["expressions"]),
-            layers=np.array(list(about["expressions"].values())),
-            report=about["report"],
-        )
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"{folder}: is no packed set ({error}); give a folder that `facewright compress` wrote"
-        ) from None
-
-
-def _inside(folder, name):
-    path = (folder / name).resolve()
-    if not path.is_relative_to(folder.resolve()):
-        raise InputError(f"{folder}: facezip.json names {name!r}, which lies outside the folder")
-    return path

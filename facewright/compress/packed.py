@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,9 +54,25 @@ class Packed:
 
     def memory_bytes(self):
         """Bytes on a graphics card without block compression: RGB or what the maps have, weights four to an RGBA."""
-        layers = len(self.weights) * -(-self.textures.shape[0] // 4) * 4
-        weights = layers * self.weights.shape[1] * self.weights.shape[2]
-        return int(self.neutral.nbytes + self.textures.nbytes + weights)
+        return memory_bytes(self.neutral, len(self.textures), len(self.weights))
+
+
+def memory_bytes(neutral, k, layers):
+    """Bytes of a neutral like this, k difference textures and so many weight maps."""
+    rows, columns = Grid(*neutral.shape[:2]).cells
+    return int(neutral.nbytes * (1 + k) + layers * -(-k // 4) * 4 * rows * columns)
+
+
+def textures_within(budget, neutrals, layers, most=4):
+    """The most difference textures of every map whose bytes stay within the budget; InputError where one does not."""
+    for k in range(most, 0, -1):
+        if sum(memory_bytes(neutral, k, layers) for neutral in neutrals) <= budget:
+            return k
+    least = sum(memory_bytes(neutral, 1, layers) for neutral in neutrals)
+    raise InputError(
+        f"compress: a budget of {budget / 1e6:.2f} MB is too small; one difference texture needs {least / 1e6:.2f} MB, "
+        "so give more or smaller textures"
+    )
 
 
 def facezip_decode(packed, weights):
@@ -104,14 +120,13 @@ def blend_vector(packed, weights):
     return beta
 
 
-def quantise(values, low, high, levels):
-    """Integer codes of values between low and high (broadcast), with 0 itself a code: codes, step, zero."""
+def quantise(values, low, high, levels, dtype):
+    """Integer codes 0 to levels of values between low and high (broadcast), with 0 itself a code: codes, step, zero."""
     low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
     step = (high - low) / levels
     step = np.where(step > 0, step, 1.0)
     zero = np.rint(-low / step)
-    kind = np.uint8 if levels == 255 else np.uint16
-    codes = np.clip(np.rint(values / step.astype(np.float32) + zero.astype(np.float32)), 0, levels).astype(kind)
+    codes = np.clip(np.rint(values / step.astype(np.float32) + zero.astype(np.float32)), 0, levels).astype(dtype)
     return codes, step, zero
 
 
@@ -128,6 +143,30 @@ def example_weights(packed, B):
     return np.tensordot(np.linalg.pinv(B), maps, 1)
 
 
+def with_examples(packed, shapes, B):
+    """The Packed whose expressions are example-based shapes (names, M of them): weight maps of Eq. 11, 8 bits each."""
+    maps = example_weights(packed, B)
+    low, high = (f(maps, axis=(1, 2))[:, None, None] for f in (np.min, np.max))
+    codes, step, zero = quantise(maps, low, high, 255, np.uint8)
+    back = np.tensordot(np.asarray(B, float), (codes - zero) * step, 1)
+    report = {
+        **packed.report,
+        "shapes": len(shapes),
+        "full_row_rank": bool(np.linalg.matrix_rank(B) == len(packed.names)),
+        # Eq. 10: how far blends of the shapes are from the textures' own weight maps
+        "largest_weight_error": float(np.abs(back - packed.weight_maps()[packed.layers]).max()),
+    }
+    return replace(
+        packed,
+        weights=codes,
+        weight_step=step[:, 0, 0],
+        weight_zero=zero[:, 0, 0],
+        names=tuple(shapes),
+        layers=np.arange(len(shapes)),
+        report=report,
+    )
+
+
 def naive_example(neutral, textures, B, m):
     """Shape m by blending whole textures, the baseline of Fig. 8: I_0 + sum_n B+_mn (I_n - I_0); (h, w, C) float."""
     share = np.linalg.pinv(np.asarray(B, dtype=np.float64))[m]
@@ -137,4 +176,13 @@ def naive_example(neutral, textures, B, m):
     return image
 
 
-__all__ = ["STEP", "Packed", "blend_vector", "decode_float", "example_weights", "facezip_decode", "naive_example"]
+__all__ = [
+    "STEP",
+    "Packed",
+    "blend_vector",
+    "decode_float",
+    "example_weights",
+    "facezip_decode",
+    "naive_example",
+    "with_examples",
+]

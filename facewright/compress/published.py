@@ -6,11 +6,20 @@ permutation cost (Eq. 3-4) those of the centroids under two masks, and both are 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 
+from facewright.compress.masks import build_masks
+from facewright.compress.refine import Pass, gram_matrix
+from facewright.compress.store import measure_tiles, quantise_textures, quantise_weights, root_mean, stored_parts
+from facewright.compress.threads import in_threads
+from facewright.compress.tiles import TEXELS
+from facewright.errors import InputError
+
 MOST_BLOCKS = 64
+MASK_CHOICES = (13, 33, 53, 83)
 
 
 def coarse_grams(tiles, grams, masks):
@@ -119,6 +128,10 @@ class PermutationSearch:
         pairs = self.table[m[:, None], m[None], states[:, None, :], states[:, :, None]]
         return pairs.sum(axis=(1, 2), dtype=np.float64) / 2
 
+    def bound(self):
+        """A cost that no state can be below: every pair of masks at its best, whatever the others want."""
+        return float(self.table.min(axis=(2, 3)).sum(dtype=np.float64) / 2)
+
     def sweep(self, states):
         """One sweep: each mask in turn takes its best permutation, the others held; in place, True where it moved."""
         moved, m = False, np.arange(self.m)
@@ -174,3 +187,58 @@ def published_maps(masks, labels, centroids, chosen):
     alpha = (slot[m[:, None], labels][:, :, None] == np.arange(chosen.shape[1])).astype(np.float32)
     picked = centroids[m[:, None], chosen].transpose(0, 2, 1)  # (m, N, K)
     return np.tensordot(masks, alpha, 1), np.tensordot(masks, picked, 1)
+
+
+def best_published(tiles, k, options, mesh, region, progress):
+    """What is stored of the published method, and its errors (store.measure_tiles); with a budget the best of
+    MASK_CHOICES."""
+    if mesh is None:
+        raise InputError("compress: --method paper computes its masks on the mesh; give one with UVs")
+    counts = (options.masks,) if options.budget is None else MASK_CHOICES
+    best = None
+    for step, count in enumerate(counts):
+        result = _encode_published(tiles, k, replace(options, masks=count), mesh, region)
+        errors = measure_tiles(tiles, result)
+        if best is None or root_mean(errors).mean() < root_mean(best[1]).mean():
+            best = result, errors
+        progress("searching", (step + 1) / len(counts))
+    return best
+
+
+def _encode_published(tiles, k, options, mesh, region):
+    masks, about = build_masks(mesh, tiles.grid, options.masks, seed=options.seed, region=region)
+    weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute)
+    n = tiles.count
+    work = Pass(tiles, k)
+    flat = np.ascontiguousarray(shares).reshape(-1, n, k)
+    d = np.empty((len(tiles), k, tiles.channels, TEXELS), np.float32)
+
+    def one(part):
+        rows = flat[work.corners[part]].transpose(0, 1, 3, 2).reshape(-1, 4 * k, n)
+        y = (rows @ tiles.differences(part, whole=True)).reshape(-1, 4, k, tiles.channels, TEXELS)
+        d[part] = (y * work.basis[:, None, None]).sum(axis=1)
+
+    in_threads(one, tiles.chunks())
+    image = tiles.grid.join(d.reshape(len(d), -1, TEXELS)).reshape(tiles.grid.height, tiles.grid.width, k, -1)
+    stored = quantise_weights(np.ascontiguousarray(weights.transpose(2, 0, 1, 3)))
+    report = {**about, "permutation_cost": cost, "solution": "published"}
+    return stored_parts(quantise_textures(tiles, image), stored, report)
+
+
+def published_search(tiles, masks, k, seed=0):
+    """PermutationSearch of a set under masks (rows, columns, m), the labels and the centroids."""
+    _, grams = gram_matrix(tiles, blocks=True)
+    blocks, values = coarse_grams(tiles, grams, masks)
+    per_mask = np.tensordot(values.T**2, blocks, 1)
+    labels = cluster_fragments(per_mask, k, seed=seed)
+    centroids = centroid_matrix(labels, k)
+    return PermutationSearch(pair_costs(blocks, values, centroids)), labels, centroids
+
+
+def published_solution(tiles, masks, k, seed=0, permute=True):
+    """Weight maps, the shares that make the difference textures, and the permutation cost."""
+    search, labels, centroids = published_search(tiles, masks, k, seed)
+    state = search.solve(seed) if permute else np.zeros(len(labels), int)
+    chosen = search.permutations[state]
+    weights, shares = published_maps(masks, labels, centroids, chosen)
+    return weights, shares, float(search.cost(state[None])[0])

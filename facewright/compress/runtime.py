@@ -1,49 +1,79 @@
 """The runtime as shader text: a low-resolution pass sums weight maps, the full-resolution pass reads six textures."""
 
-GLSL = """// FaceZip runtime (WebGL 2 / GLSL ES 3.00), up to four 8-bit difference textures. Values: facezip.json.
-// Pass 1, once for every expression with a weight, into an RGBA16F target of weight_size, additive (ONE, ONE):
-//   outColor = facezipWeight(uv)
-uniform sampler2D facezipWeightMap;
-uniform vec4 facezipWeightStep, facezipWeightZero;   // weights[layer]; zero in codes, 0-255
-uniform float facezipBeta;                           // weight of the expression
-vec4 facezipWeight(vec2 uv) {
-  return facezipBeta * (texture(facezipWeightMap, uv) * 255.0 - facezipWeightZero) * facezipWeightStep;
-}
+GLSL = """// FaceZip runtime, GLSL ES 3.00 (WebGL 2). Every value is in facezip.json; see docs/compress-engines.md.
+// Rows count from the top of the images: uv = (0, 0) is their upper left corner, and nothing is flipped on upload.
+// No sampler decodes sRGB; all but the atlas filter linearly and clamp to the edge.
 
-// Pass 2, in the material. All samplers: linear filter, clamp to edge, no sRGB decoding.
-uniform sampler2D facezipNeutral, facezipD0, facezipD1, facezipD2, facezipD3, facezipSum;
-uniform vec2 facezipUvScale;                         // weight_uv_scale
-uniform vec3 facezipStep[4], facezipZero[4];         // differences[i]; step 0 for one that is missing
-vec3 facezip(vec2 uv) {
-  vec4 w = texture(facezipSum, uv * facezipUvScale);
-  vec3 d = w.x * (texture(facezipD0, uv).rgb * 255.0 - facezipZero[0]) * facezipStep[0];
-  d += w.y * (texture(facezipD1, uv).rgb * 255.0 - facezipZero[1]) * facezipStep[1];
-  d += w.z * (texture(facezipD2, uv).rgb * 255.0 - facezipZero[2]) * facezipStep[2];
-  d += w.w * (texture(facezipD3, uv).rgb * 255.0 - facezipZero[3]) * facezipStep[3];
-  return clamp(texture(facezipNeutral, uv).rgb + d / 255.0, 0.0, 1.0);
+// Pass 1, once a frame, into a float target (RGBA16F or RGBA32F) of weight_size:
+//   outColor = facezipWeights(ivec2(gl_FragCoord.xy));
+#ifdef FACEZIP_LAYERS                       // number of weight maps
+uniform highp sampler2D facezipAtlas;       // weights.png or weights.ktx2
+uniform ivec2 facezipWeightSize;            // weight_size
+uniform int facezipAcross;                  // places[0]
+uniform vec4 facezipGain[FACEZIP_LAYERS];   // 255 * step of the layer * weights of its expressions, summed
+uniform vec4 facezipOffset;                 // sum over layers of gain / 255 * zero
+vec4 facezipWeights(ivec2 cell) {
+  vec4 sum = -facezipOffset;
+  for (int n = 0; n < FACEZIP_LAYERS; n++) {
+    if (facezipGain[n] == vec4(0.0)) continue;
+    ivec2 place = ivec2(n % facezipAcross, n / facezipAcross) * facezipWeightSize;
+    sum += facezipGain[n] * texelFetch(facezipAtlas, place + cell, 0);
+  }
+  return sum;
 }
+#else
+
+// Pass 2, in the material: reads at most six textures.
+uniform highp sampler2D facezipNeutral, facezipD0, facezipD1, facezipD2, facezipD3, facezipSum;
+uniform highp vec2 facezipUvScale;          // weight_uv_scale
+uniform highp vec4 facezipStep[4];          // differences[i].step, 0 for what is missing
+uniform highp vec4 facezipZero[4];          // differences[i].zero / 255
+highp vec4 facezip(highp vec2 uv) {
+  highp vec4 w = texture(facezipSum, uv * facezipUvScale);
+  highp vec4 d = w.x * facezipStep[0] * (texture(facezipD0, uv) - facezipZero[0]);
+  d += w.y * facezipStep[1] * (texture(facezipD1, uv) - facezipZero[1]);
+  d += w.z * facezipStep[2] * (texture(facezipD2, uv) - facezipZero[2]);
+  d += w.w * facezipStep[3] * (texture(facezipD3, uv) - facezipZero[3]);
+  return clamp(texture(facezipNeutral, uv) + d, 0.0, 1.0);
+}
+#endif
 """
 
-HLSL = """// FaceZip runtime (HLSL, Shader Model 5), up to four 8-bit difference textures. Values: facezip.json.
-// uv has its origin at the top left of the image. Pass 1: additive into an RGBA16F target of weight_size.
-Texture2D facezipWeightMap, facezipNeutral, facezipD0, facezipD1, facezipD2, facezipD3, facezipSum;
+HLSL = """// FaceZip runtime, HLSL (Shader Model 5). Every value is in facezip.json; see docs/compress-engines.md.
+// uv = (0, 0) is the upper left corner of the images. No texture is sRGB; linear filter, clamp.
+#ifndef FACEZIP_LAYERS
+#define FACEZIP_LAYERS 64                    // at least the number of weight maps
+#endif
+Texture2D facezipAtlas, facezipNeutral, facezipD0, facezipD1, facezipD2, facezipD3, facezipSum;
 SamplerState facezipLinearClamp;
-float4 facezipWeightStep, facezipWeightZero;
-float facezipBeta;
-float2 facezipUvScale;
-float3 facezipStep[4], facezipZero[4];
+cbuffer Facezip {
+  float4 facezipGain[FACEZIP_LAYERS];        // 255 * step of the layer * weights of its expressions, summed
+  float4 facezipOffset;                      // sum over layers of gain / 255 * zero
+  float4 facezipStep[4];                     // differences[i].step, 0 for what is missing
+  float4 facezipZero[4];                     // differences[i].zero / 255
+  float2 facezipUvScale;                     // weight_uv_scale
+  int2 facezipWeightSize;                    // weight_size
+  int facezipAcross;                         // places[0]
+  int facezipCount;                          // number of weight maps
+};
 
-float4 FacezipWeight(float2 uv) {
-  float4 q = facezipWeightMap.Sample(facezipLinearClamp, uv) * 255.0;
-  return facezipBeta * (q - facezipWeightZero) * facezipWeightStep;
+// Pass 1, once a frame, into a float target (R16G16B16A16_FLOAT) of weight_size; cell = SV_Position.xy.
+float4 FacezipWeights(int2 cell) {
+  float4 sum = -facezipOffset;
+  for (int n = 0; n < facezipCount; n++) {
+    int2 place = int2(n % facezipAcross, n / facezipAcross) * facezipWeightSize;
+    sum += facezipGain[n] * facezipAtlas.Load(int3(place + cell, 0));
+  }
+  return sum;
 }
 
-float3 Facezip(float2 uv) {
+// Pass 2, in the material: reads at most six textures.
+float4 Facezip(float2 uv) {
   float4 w = facezipSum.Sample(facezipLinearClamp, uv * facezipUvScale);
-  float3 d = w.x * (facezipD0.Sample(facezipLinearClamp, uv).rgb * 255.0 - facezipZero[0]) * facezipStep[0];
-  d += w.y * (facezipD1.Sample(facezipLinearClamp, uv).rgb * 255.0 - facezipZero[1]) * facezipStep[1];
-  d += w.z * (facezipD2.Sample(facezipLinearClamp, uv).rgb * 255.0 - facezipZero[2]) * facezipStep[2];
-  d += w.w * (facezipD3.Sample(facezipLinearClamp, uv).rgb * 255.0 - facezipZero[3]) * facezipStep[3];
-  return saturate(facezipNeutral.Sample(facezipLinearClamp, uv).rgb + d / 255.0);
+  float4 d = w.x * facezipStep[0] * (facezipD0.Sample(facezipLinearClamp, uv) - facezipZero[0]);
+  d += w.y * facezipStep[1] * (facezipD1.Sample(facezipLinearClamp, uv) - facezipZero[1]);
+  d += w.z * facezipStep[2] * (facezipD2.Sample(facezipLinearClamp, uv) - facezipZero[2]);
+  d += w.w * facezipStep[3] * (facezipD3.Sample(facezipLinearClamp, uv) - facezipZero[3]);
+  return saturate(facezipNeutral.Sample(facezipLinearClamp, uv) + d);
 }
 """

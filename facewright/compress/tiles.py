@@ -7,12 +7,18 @@ w(p) = sum over c of B[c, p] w_c with a constant B (4, 64), and all sums over te
 
 from __future__ import annotations
 
+import tempfile
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from facewright.errors import InputError
+
 STEP = 8
 TEXELS = STEP * STEP
+CLAIM = 1 << 24
 
 
 def bilinear_basis():
@@ -46,7 +52,8 @@ class Grid:
         last = rows if last is None else last
         channels = image.shape[2]
         padded = np.zeros(((last - first) * STEP, columns * STEP, channels), image.dtype)
-        top, bottom = max(first * STEP - STEP // 2, 0), min(last * STEP - STEP // 2, self.height)
+        top = min(max(first * STEP - STEP // 2, 0), self.height)
+        bottom = min(last * STEP - STEP // 2, self.height)
         start = top - (first * STEP - STEP // 2)
         padded[start : start + bottom - top, STEP // 2 : STEP // 2 + self.width] = image[top:bottom]
         tiles = padded.reshape(last - first, STEP, columns, STEP, channels).transpose(0, 2, 4, 1, 3)
@@ -90,16 +97,42 @@ def _upsample_axis(values, size, axis):
     return low + (high - low) * share.reshape(shape)
 
 
+@contextmanager
+def scratch_file(size, limit):
+    """Path of a scratch file of so many bytes, removed in the end; None where size is within the limit."""
+    if size <= limit:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix="facezip-") as folder:
+        path = Path(folder) / "tiles"
+        try:
+            # The space is claimed now: a full disk met while writing to mapped memory would end the process.
+            with open(path, "wb") as stream:
+                for _ in range(-(-size * 5 // 4 // CLAIM)):
+                    stream.write(bytes(CLAIM))
+        except OSError as error:
+            raise InputError(
+                f"compress: {size / 1e9:.0f} GB of scratch space are needed in {folder} ({error.strerror}); "
+                "free space or set TMPDIR to another disk"
+            ) from error
+        yield path
+
+
 class TextureTiles:
     """All textures of a set in tiles, 8 or 16 bits a channel as given; differences are made chunk by chunk.
 
     neutral   (h, w, C) uint8 or uint16
-    textures  iterable of N images like it; each is cut as it comes and not kept
+    count     number of textures that put() may bring
     scale     (h, w) float32: 0 where no triangle covers the texel, else the square root of its priority
     scratch   file to keep the tiles in instead of memory, so that memory does not grow with N
+    levels    (C,) largest code that a channel is stored with
     """
 
-    def __init__(self, neutral, textures, count, scale, scratch=None):
+    def __init__(self, neutral, count, scale, scratch=None, levels=None):
+        self.shape = neutral.shape
+        most = np.iinfo(neutral.dtype).max
+        self.levels = np.full(neutral.shape[2], most) if levels is None else np.asarray(levels)
+        self.gain = np.ones((neutral.shape[2], 1), np.float32)  # how much a difference of a channel counts
         height, width, self.channels = neutral.shape
         self.grid = Grid(height, width)
         self.count = count
@@ -109,12 +142,38 @@ class TextureTiles:
         if scratch is None:
             self.data = np.empty(shape, neutral.dtype)
         else:
-            self.data = np.memmap(scratch, neutral.dtype, "w+", shape=shape)
-        for n, texture in enumerate(textures):
-            for row in range(rows):
-                self.data[row * columns : (row + 1) * columns, n] = self.grid.cut(texture, row, row + 1)
+            self.data = np.memmap(scratch, neutral.dtype, "r+", shape=shape)
         self.neutral = self.grid.cut(neutral)
         self.scale = self.grid.cut(scale.astype(np.float32)[:, :, None])
+
+    @classmethod
+    def of(cls, neutral, textures, covered):
+        """All of a list of textures, texels outside covered (h, w) left out."""
+        tiles = cls(neutral, len(textures), covered.astype(np.float32))
+        for n, texture in enumerate(textures):
+            tiles.put(n, texture)
+        return tiles
+
+    def put(self, n, texture):
+        """Cut texture n."""
+        rows, columns = self.grid.tiles
+        for row in range(rows):
+            self.data[row * columns : (row + 1) * columns, n] = self.grid.cut(texture, row, row + 1)
+
+    def keep(self, count):
+        """Only the first textures."""
+        self.data, self.count = self.data[:, :count], count
+
+    def balance(self, channels):
+        """Let the maps of so many channels each, side by side in one image, count alike, as much as the first."""
+        squares = np.zeros(self.channels)
+        for part in self.chunks():
+            x = self.differences(part).reshape(-1, self.channels, TEXELS)
+            squares += np.einsum("ncp,ncp->c", x, x, dtype=np.float64)
+        first = np.cumsum([0, *channels[:-1]])
+        rms = np.sqrt(np.add.reduceat(squares, first) / channels)
+        gain = np.where(rms > 0, rms[0] / np.where(rms > 0, rms, 1), 1) if rms[0] > 0 else np.ones(len(rms))
+        self.gain = np.repeat(gain, channels).astype(np.float32)[:, None]
 
     def __len__(self):
         return len(self.data)
@@ -124,9 +183,9 @@ class TextureTiles:
         size = max(8, size * 20 // max(self.count, 20))
         return [slice(start, min(start + size, len(self))) for start in range(0, len(self), size)]
 
-    def differences(self, part):
-        """(tiles, N, C * 64) float32 in 0-255, times scale."""
+    def differences(self, part, whole=False):
+        """(tiles, N, C * 64) float32 in 0-255, times scale and gain; whole: as they are, uncovered texels too."""
         x = self.data[part].astype(np.float32)
         x -= self.neutral[part, None].astype(np.float32)
-        x *= self.scale[part, None] * np.float32(self.unit)
+        x *= np.float32(self.unit) if whole else self.scale[part, None] * (self.gain * np.float32(self.unit))
         return x.reshape(len(x), self.count, self.channels * TEXELS)

@@ -1,5 +1,18 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
-from facewright.contact.eyes import EyeShapeOptions, EyeShapes, solve_eyes
+from facewright.contact.eyes import EyeShapeOptions, solve_eyes
+from facewright.contact.jaw import find_jaw
+from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
+from facewright.contact.neck import hold_neck
+from facewright.contact.targets import Targets
 
-__all__ = ["EyeShapeOptions", "EyeShapes", "solve_eyes"]
+__all__ = [
+    "EyeShapeOptions",
+    "MouthOptions",
+    "Targets",
+    "find_jaw",
+    "hold_neck",
+    "part_lips",
+    "solve_eyes",
+    "solve_mouth",
+]

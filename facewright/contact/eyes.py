@@ -10,15 +10,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from facewright.contact.gaze import gaze_rotation, look_shapes, turned_ball
 from facewright.contact.lids import LidMotionOptions, Lids
+from facewright.contact.targets import Targets
 from facewright.conventions import corrective_name, in_between_name
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
 _ROUNDS = 3
+_FULLNESS = 0.6
+_CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
+_CORNER_MM = 2.0
 
 
 @dataclass(frozen=True)
@@ -39,19 +44,8 @@ class EyeShapeOptions:
     free_mm: float = 24.0
 
 
-@dataclass(frozen=True)
-class EyeShapes:
-    """deltas (s, n, 3) of the template's shapes, those of the eyes made anew; extras name -> (n, 3): in-betweens
-    "name@0.5" and correctives "a+b"; in_betweens and correctives as in data.Rig."""
-
-    deltas: np.ndarray
-    extras: dict[str, np.ndarray]
-    in_betweens: dict[str, dict[float, str]]
-    correctives: dict[str, tuple[str, ...]]
-
-
 def solve_eyes(face, deltas, options=None):
-    """EyeShapes of a Face with its parts in place and its transferred shapes deltas (s, n, 3) mm."""
+    """Targets of a Face with its parts in place from its transferred shapes (s, n, 3) mm; eye shapes made anew."""
     options = options or EyeShapeOptions()
     names = list(face.template.shape_names)
     result = np.array(deltas)
@@ -74,7 +68,7 @@ def solve_eyes(face, deltas, options=None):
             target = corrective_name(pair)
             extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
             correctives[target] = pair
-    return EyeShapes(result, extras, in_betweens, correctives)
+    return Targets(tuple(names), result, extras, in_betweens, correctives)
 
 
 class _Eye:
@@ -93,7 +87,10 @@ class _Eye:
         socket = face.regions[f"socket_{side}"][self.skin]
         held = face.regions["mouth_interior"][self.skin] | face.regions["nostrils"][self.skin]
         margin = self.V[np.concatenate([upper, lower])]
-        distance = np.linalg.norm(self.V[:, None] - margin[None, ::3], axis=2).min(axis=1)
+        distance = cKDTree(margin).query(self.V)[0]
+        # A template's own squint may reach far down the cheek, which is cheekSquint's.
+        place = np.clip((_CHEEK_MM[1] - distance) / (_CHEEK_MM[1] - _CHEEK_MM[0]), 0.0, 1.0)
+        self.squints = (place * place * (3.0 - 2.0 * place))[:, None]
         free = (distance < options.free_mm) & ~held & ~(socket & (distance > 0.5 * options.free_mm))
         self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
         self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
@@ -102,7 +99,11 @@ class _Eye:
         """shape name -> {weight: (n, 3) delta} of this eye's shapes that the template has."""
         side = self.side.capitalize()
         made = {f"eyeBlink{side}": self._blink, f"eyeWide{side}": self._wide}
-        found = {name: {w: self._full(make(w)) for w in (HALF, 1.0)} for name, make in made.items() if name in names}
+        found = {
+            name: {w: self._full(make(w), shut=make == self._blink and w == 1.0) for w in (HALF, 1.0)}
+            for name, make in made.items()
+            if name in names
+        }
         squint = f"eyeSquint{side}"
         if squint in names:
             own = deltas[names.index(squint), self.skin]
@@ -130,16 +131,24 @@ class _Eye:
             # margins have slid along the axis.
             open_u, open_l = self.lids.opening(closed)
             closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball)
-        return self._full(self.lids.flush(closed) - pose + self.V)
+        return self._full(self.lids.flush(closed), pose, shut=True)
 
     def _turned_both(self, direction, ball):
         """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
+        # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
         upper, lower = (
-            np.radians(turn) * profile for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
+            np.radians(turn) * profile ** (1.0 / _FULLNESS)
+            for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
         )
-        open_u, open_l = self.lids.opening(self.V)
-        share = self.options.lids.upper_share
-        return self.lids.turned(self.V, upper - share * open_u, lower + (1 - share) * open_l, ball)
+        close_u, close_l = self._closing_turns()
+        return self.lids.turned(self.V, upper + close_u, lower + close_l, ball, self.lids.slides(self.V))
+
+    def _closing_turns(self):
+        """(u,), (l,) radians that bring both margins of the neutral to the closing line, where they will have slid."""
+        lids = self.lids
+        slides = lids.slides(self.V)
+        goals = lids.closing(self.V, slides)
+        return [goal - lids.angles(self.V[line]) for goal, line in zip(goals, (lids.upper, lids.lower))]
 
     def diagonals(self, names):
         """Pairs of look shapes that add up to a look past a corner of the eye."""
@@ -153,7 +162,7 @@ class _Eye:
         looks = look_shapes(self.side)
         turns = [gaze_rotation(looks[name], self.side) for name in pair]
         R = Rotation.from_rotvec(sum(Rotation.from_matrix(turn).as_rotvec() for turn in turns)).as_matrix()
-        full = self._full(self.lids.lifted(pose, turned_ball(self.ball, R)) - pose + self.V)
+        full = self._full(self.lids.lifted(pose, turned_ball(self.ball, R)), pose)
         # Two turns added up as chords swell the ball: it gets the one turn that they mean.
         missing = R - turns[0] - turns[1] + np.eye(3)
         for part in eye_parts(self.face.template, self.side):
@@ -161,9 +170,8 @@ class _Eye:
         return full
 
     def _blink(self, weight):
-        open_u, open_l = self.lids.opening(self.V)
-        share = self.options.lids.upper_share
-        pose = self.lids.turned(self.V, -weight * share * open_u, weight * (1 - share) * open_l)
+        slides = [weight * slide for slide in self.lids.slides(self.V)]
+        pose = self.lids.turned(self.V, *(weight * turn for turn in self._closing_turns()), slides=slides)
         return self.lids.flush(pose) if weight == 1.0 else pose
 
     def _wide(self, weight):
@@ -171,13 +179,14 @@ class _Eye:
 
     def _squint(self, own):
         open_u, open_l = self.lids.opening(self.V)
-        pose = self.V + own
+        pose = self.V + self.squints * own
         upper, lower = self.lids.upper, self.lids.lower
         wanted_u = self.lids.angles(self.V[upper]) - self.options.squint_share[0] * open_u
         wanted_l = self.lids.angles(self.V[lower]) + self.options.squint_share[1] * open_l
         turn_u = wanted_u - self.lids.angles(pose[upper])
         turn_l = wanted_l - self.lids.angles(pose[lower])
-        return self.lids.turned(pose, turn_u, turn_l)
+        # Towards the canthi, which stay with the skin, the margins do too: else they would be torn off the corner.
+        return self.lids.turned(pose, *(turn * _ramp(self.V[c]) for turn, c in ((turn_u, upper), (turn_l, lower))))
 
     def _look(self, direction, own, weight):
         R = gaze_rotation(direction, self.side, weight)
@@ -193,15 +202,22 @@ class _Eye:
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
         return self.lids.turned(pose, upper, lower, ball)
 
-    def _full(self, pose):
-        """(n, 3) delta of all parts from a pose of the skin."""
+    def _full(self, pose, base=None, shut=False):
+        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose; shut: its lids meet."""
         delta = np.zeros(self.face.vertices.shape)
-        delta[self.skin] = pose - self.V
+        delta[self.skin] = self.lids.settled(pose, shut) - (self.V if base is None else base)
         delta[np.abs(delta).max(axis=1) < 1e-4] = 0.0
         return delta
+
+
+def _ramp(chain):
+    """(k,) 0 at the canthi, 1 from _CORNER_MM on along a margin."""
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    share = np.clip(np.minimum(steps, steps[-1] - steps) / _CORNER_MM, 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
 
 
 def _profile(chain):
     """(k,) 0 at the canthi, 1 over the middle of a margin."""
     steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
-    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** 0.6
+    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** _FULLNESS

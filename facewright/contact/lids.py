@@ -11,9 +11,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
-from facewright.mesh.spread import spread_smoothly
+from facewright.mesh.adjacency import unique_edges
+from facewright.mesh.folds import laid_flat, neighbour_mean
+from facewright.mesh.spread import SmoothSpread
+from facewright.solve.quadratic import Factorization
 from facewright.transfer.eyeball import lid_clearance
+
+_KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
+_CORNER_MM = 6.0  # around a canthus the field is evened out
+_LOOSE = 4  # margin points from a canthus on, itself included, that may be smoothed with a fold
+_JOININGS = 2
+_WAVES = 2  # of the closing line between the canthi
 
 
 @dataclass(frozen=True)
@@ -55,6 +66,14 @@ class Lids:
         # Nothing is asked for that the neutral does not have: the corners lie deep and stay so.
         self.clear = np.minimum(clear, np.maximum(ball.gap(vertices[self.skin]), self.options.gap_mm))
         self._corner = np.isin(self.skin, self.canthi)
+        self._corners = None
+        self._near_faces = faces[free[faces].any(axis=1)]
+        self._mean = neighbour_mean(self._near_faces, len(vertices), (self.upper, self.lower))
+        self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
+        self._keep = ~free
+        for line in (self.upper, self.lower):
+            self._keep[line[_LOOSE:-_LOOSE]] = True
+        self._keep[self.canthi] = False
 
     def angles(self, points):
         """(k,) radians of elevation of points (k, 3) about the axis, 0 straight ahead."""
@@ -70,20 +89,108 @@ class Lids:
         above = _along(at[self.lower], at[self.upper], theta_u)
         return theta_u - below, above - theta_l
 
-    def turned(self, pose, upper_turn, lower_turn, ball=None):
-        """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them."""
-        field = self.field(upper_turn, lower_turn)
-        return self.lifted(self.rotated(pose, field), ball)
+    def closing(self, pose, slides):
+        """(u,), (l,) radians where each margin point of a pose (n, 3) lies on the closing line, slid along it.
 
-    def field(self, upper_turn, lower_turn):
-        """(n,) radians: the margins' turns spread over the skin around."""
+        The line divides the opening by upper_share. It is smooth from canthus to canthus (a few waves over the chord):
+        where margins run steeply into a corner a share of their opening would leave a notch there.
+        """
+        at = pose @ self.axis
+        ends = [line[i] for i in (0, -1) for line in (self.upper, self.lower)]
+        start, stop = at[ends].min(), at[ends].max()
+        theta_ends = self.angles(pose[ends])[np.argsort(at[ends])][[0, -1]]
+        theta_u, theta_l = self.angles(pose[self.upper]), self.angles(pose[self.lower])
+        places = np.linspace(start, stop, 65)[1:-1]
+        above, below = _along(places, at[self.upper], theta_u), _along(places, at[self.lower], theta_l)
+        share = self.options.upper_share
+        u = (places - start) / (stop - start)
+        rise = (1.0 - share) * above + share * below - np.interp(u, [0, 1], theta_ends)
+        waves = np.arange(1, _WAVES + 1)
+        heights = np.linalg.lstsq(np.sin(np.pi * np.outer(u, waves)), rise, rcond=None)[0]
+
+        def line(index, slide):
+            v = np.clip((at[index] + slide - start) / (stop - start), 0.0, 1.0)
+            return np.interp(v, [0, 1], theta_ends) + np.sin(np.pi * np.outer(v, waves)) @ heights
+
+        return [line(index, slide) for index, slide in zip((self.upper, self.lower), slides)]
+
+    def slides(self, pose):
+        """(u,), (l,) mm along the axis that margin points of a pose (n, 3) need when they come to lie in one line.
+
+        A corner of the eye is round: its points stand above each other, and closed they would fall together. From the
+        canthus inwards each keeps a share of its distance from the last.
+        """
+        return [self._slides(pose[line]) for line in (self.upper, self.lower)]
+
+    def _slides(self, chain):
+        at = chain @ self.axis
+        way = np.sign(at[-1] - at[0])
+        steps = _KEPT_SPACING * np.linalg.norm(np.diff(chain, axis=0), axis=1)
+        rest, slid = at * way, at * way  # from the first canthus to the last
+        middle = len(at) // 2
+        for i in range(1, middle):
+            slid[i] = max(rest[i], slid[i - 1] + steps[i - 1])
+            slid[-1 - i] = min(rest[-1 - i], slid[-i] - steps[-i])
+        return way * (slid - rest)
+
+    def turned(self, pose, upper_turn, lower_turn, ball=None, slides=None):
+        """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them.
+
+        slides  (u,), (l,) mm that they move along the axis besides
+        """
+        turns = self.field(upper_turn, lower_turn)
+        if slides is not None:
+            pose = pose + self.field(*slides)[:, None] * self.axis
+        return self.lifted(self.rotated(pose, turns), ball)
+
+    def field(self, upper, lower):
+        """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
         values = np.zeros(len(self.V))
-        values[self.lower] = lower_turn
-        values[self.upper] = upper_turn
+        values[self.lower] = lower
+        values[self.upper] = upper
         values[self.canthi] = 0.0
-        handles = self.margin
-        spread = spread_smoothly(self.V, self.F, handles, values[handles][:, None], self.free, self.options.reach_mm)
-        return spread[:, 0]
+        # Round a corner the values change sign within a millimetre, where the smooth field swings over.
+        return self._evened_corners(self._spread(values[self.margin][:, None])[:, 0])
+
+    def _evened_corners(self, field):
+        """The field (n,) made harmonic around the canthi: nowhere more than on the rim of what is around."""
+        if self._corners is None:
+            away = cKDTree(self.V[self.canthi]).query(self.V, distance_upper_bound=_CORNER_MM)[0]
+            inside = np.isfinite(away) & self.free
+            inside[self.margin] = False
+            edges = unique_edges(self.F[inside[self.F].any(axis=1)])
+            weight = 1.0 / np.linalg.norm(self.V[edges[:, 0]] - self.V[edges[:, 1]], axis=1)
+            n = len(self.V)
+            W = sp.coo_matrix((weight, (edges[:, 0], edges[:, 1])), shape=(n, n)).tocsr()
+            rows = (sp.diags(np.asarray((W + W.T).sum(axis=1)).ravel()) - W - W.T)[inside]
+            self._corners = inside, Factorization(rows[:, inside]), rows[:, ~inside]
+        inside, factor, rest = self._corners
+        result = field.copy()
+        result[inside] = factor.solve(-(rest @ field[~inside]))
+        return result
+
+    def settled(self, pose, shut=False):
+        """The pose (n, 3) without folded faces: where the corners press skin together it is smoothed.
+
+        shut: the margins shall meet, also where they were smoothed
+        """
+        for _ in range(_JOININGS if shut else 0):
+            flat = laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
+            if flat is pose:
+                return pose
+            pose = self._joined(flat)
+        return laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
+
+    def _joined(self, pose):
+        """The pose (n, 3) with the margins' ends half way between each other."""
+        at = pose @ self.axis
+        result = pose.copy()
+        for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
+            ends = np.concatenate([own[1:_LOOSE], own[-2 : -_LOOSE - 1 : -1]])
+            across = np.stack([_along(at[ends], at[other], pose[other, i]) for i in range(3)], axis=1)
+            fading = np.tile(np.linspace(0.5, 0.1, _LOOSE - 1), 2)[:, None]
+            result[ends] += fading * (across - pose[ends])
+        return result
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""

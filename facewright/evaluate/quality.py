@@ -14,7 +14,9 @@ from facewright.mesh.raster import Camera, RayScene
 
 SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
-RIM_MM = 2.0
+RIM_MM, LIP_RIM_MM = 2.0, 1.0
+FINE = 5  # rays along the side of a pixel that is looked at closely
+CANTHI, CORNERS = ("mp133", "mp33", "mp362", "mp263"), ("mp61", "mp291")
 
 
 def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
@@ -51,37 +53,12 @@ def _near_box(vertices, faces, points, margin_mm=5.0):
     return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
 
 
-def folded_by_shape(neutral, moved, faces, mask=None):
-    """Indices of faces turned by more than 90 degrees against the neutral after the best rotation around them.
+def torn_edges(neutral, moved, faces, mask=None, *, edges=None, grow_mm=4.0, factor=3.0):
+    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices.
 
-    neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
-    fitted to the corners of all faces that share a vertex with it (Kabsch).
+    edges  unique_edges(faces), if they are known already
     """
-    covariance = _vertex_covariance(neutral, moved, faces)
-    around = covariance[faces].sum(axis=1)  # (m, 3, 3)
-    U, _, Vt = np.linalg.svd(around)
-    flip = np.linalg.det(U @ Vt) < 0
-    U[flip, :, 2] *= -1
-    expected = np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces))
-    folded = (expected * face_normals(moved, faces)).sum(axis=1) < 0
-    return np.flatnonzero(folded if mask is None else folded & mask)
-
-
-def _vertex_covariance(neutral, moved, faces):
-    """(n, 3, 3) sums over the faces at a vertex of (rest edge)(moved edge)^T."""
-    total = np.zeros((len(neutral), 3, 3))
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        rest = neutral[faces[:, b]] - neutral[faces[:, a]]
-        now = moved[faces[:, b]] - moved[faces[:, a]]
-        outer = rest[:, :, None] * now[:, None, :]
-        for corner in range(3):
-            np.add.at(total, faces[:, corner], outer)
-    return total
-
-
-def torn_edges(neutral, moved, faces, mask=None, *, grow_mm=4.0, factor=3.0):
-    """(k, 2) edges that grow by more than 4 mm and to over 3 times their length; mask (n,) bool limits the vertices."""
-    edges = unique_edges(faces)
+    edges = unique_edges(faces) if edges is None else edges
     if mask is not None:
         edges = edges[mask[edges].all(axis=1)]
     rest = np.linalg.norm(neutral[edges[:, 0]] - neutral[edges[:, 1]], axis=1)
@@ -109,13 +86,22 @@ def visible_interior_mm2(vertices, faces, interior, center, *, width_mm=80.0, mm
     """Largest area of interior faces that is seen through the lips from one of the views, mm2 in the picture plane.
 
     interior (m,) bool: faces of the mouth bag, teeth and tongue; center (3,) the middle of the mouth
+    A pixel counts if most of it shows the inside: lips that touch leave a slit of a few hundredths of a millimetre,
+    through which single rays pass and which no picture shows.
     """
     scene, pixels = RayScene(vertices, faces), round(width_mm / mm_per_px)
+    shifts = (np.arange(FINE) + 0.5) / FINE - 0.5
     most = 0.0
     for yaw, pitch in views:
         camera = Camera.looking_at(center, yaw, pitch, width_mm / 2, (pixels, pixels))
-        face = scene.cast(*camera.rays()).face
-        most = max(most, float(interior[face[face >= 0]].sum()) * mm_per_px**2)
+        origins, directions = camera.rays()
+        face = scene.cast(origins, directions).face
+        suspects = np.flatnonzero((face >= 0) & interior[face])
+        x, y = (shifts * mm_per_px)[:, None, None] * camera.R[0], (shifts * mm_per_px)[None, :, None] * camera.R[1]
+        fine = (origins[suspects, None, None] + x + y).reshape(-1, 3)
+        face = scene.cast(fine, np.repeat(directions[suspects], FINE**2, axis=0)).face
+        inside = ((face >= 0) & interior[face]).reshape(-1, FINE**2).mean(axis=1) > 0.5
+        most = max(most, float(inside.sum()) * mm_per_px**2)
     return most
 
 
@@ -129,19 +115,39 @@ def region_faces(mask, faces):
     return mask[faces].all(axis=1)
 
 
-def lid_rim_faces(vertices, faces, lines, rim_mm=RIM_MM):
-    """(m,) bool: faces within rim_mm of a lid margin: the thickness of the lids, which belongs to the eye opening."""
-    margins = np.concatenate([vertices[line] for name, line in lines.items() if name.startswith("lid_")])
-    return cKDTree(margins).query(vertices[faces].mean(axis=1))[0] < rim_mm
+def rim_faces(vertices, faces, lines, ends, rim_mm):
+    """(m,) bool: faces within rim_mm of lines of contact (each (k,)): the thickness of lids and lips.
+
+    ends (c, 3): canthi or corners; between a line's end and the corner before it, the groove is part of the opening
+    """
+    margins = [vertices[line] for line in lines]
+    tips = np.array([tip for margin in margins for tip in margin[[0, -1]]])
+    for end in ends:
+        tip = tips[np.linalg.norm(tips - end, axis=1).argmin()]
+        margins.append(np.linspace(tip, end, 9))
+    return cKDTree(np.concatenate(margins)).query(vertices[faces].mean(axis=1))[0] < rim_mm
+
+
+def _rims(template, fit, lines):
+    """(m,) bool of the rims of lids, and of lips without them."""
+
+    def rim(prefix, landmarks, rim_mm):
+        known = [i for i, name in enumerate(template.landmarks.names) if name in landmarks]
+        ends = template.landmarks.positions(fit, template.faces)[known]
+        mine = [line for name, line in lines.items() if name.startswith(prefix)]
+        return rim_faces(fit, template.faces, mine, ends, rim_mm)
+
+    lids = rim("lid_", CANTHI, RIM_MM)
+    return lids, rim("lip_seam_", CORNERS, LIP_RIM_MM) & ~lids
 
 
 def measure_quality(scan, fit, template, regions=None, lines=None):
     """Soundness of a fit, as report.json has it under `registration`.
 
     scan a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template
-    returns dict folded, folded_lid_rims (apart: a scan shows a bump or the other lid where the template has the lid's
-    thickness, so its normal there says nothing), self_intersections (pairs with a face in region `face` that the
-    neutral has not), lip_gap_mm (largest), visible_mouth_mm2
+    returns dict folded, folded_lid_rims and folded_lip_rims (apart: a scan shows a bump or the other lid or lip where
+    the template has its thickness, so its normal there says nothing), self_intersections (pairs with a face in region
+    `face` that the neutral has not), lip_gap_mm (largest), visible_mouth_mm2
     """
     regions = template.regions if regions is None else regions
     lines = template.lines if lines is None else lines
@@ -150,7 +156,7 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     skin = np.zeros(len(faces), bool)
     skin[template.skin.face_slice] = True
     folded = folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)
-    rim = lid_rim_faces(fit, faces, lines)
+    lid_rim, lip_rim = _rims(template, fit, lines)
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)
     inside = region_faces(regions["mouth_interior"], faces)
@@ -158,8 +164,9 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
         if part.name in ("teeth_upper", "teeth_lower", "tongue"):
             inside[part.face_slice] = True
     return {
-        "folded": int((~rim[folded]).sum()),
-        "folded_lid_rims": int(rim[folded].sum()),
+        "folded": int((~(lid_rim | lip_rim)[folded]).sum()),
+        "folded_lid_rims": int(lid_rim[folded].sum()),
+        "folded_lip_rims": int(lip_rim[folded].sum()),
         "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),
         "lip_gap_mm": float(gaps.max()),
         "visible_mouth_mm2": visible_interior_mm2(fit, faces, inside, middle),

@@ -19,22 +19,58 @@ def spread_smoothly(V, F, handles, values, free, reach_mm=np.inf):
     reach_mm  the field fades over about this distance; without it a tilt at the handles grows with distance
     returns   (n, d); at the border of free the field and its slope vanish
     """
-    n = len(V)
-    field = np.zeros((n, values.shape[1]))
-    field[handles] = values
-    unknown = free.copy()
-    unknown[handles] = False
-    if not unknown.any():
+    return SmoothSpread(V, F, handles, free, reach_mm)(values)
+
+
+class SmoothSpread:
+    """spread_smoothly for many values at the same handles: the system is factored once."""
+
+    def __init__(self, V, F, handles, free, reach_mm=np.inf):
+        self.n, self.handles, self.used = len(V), handles, None
+        unknown = free.copy()
+        unknown[handles] = False
+        if not unknown.any():
+            return
+        near = unknown.copy()
+        near[F[unknown[F].any(axis=1)].ravel()] = True
+        faces = F[near[F].any(axis=1)]  # two rings: enough for L M^-1 L at the unknowns
+        self.used, local = np.unique(faces, return_inverse=True)
+        energy = _bending(V[self.used], local.reshape(-1, 3), reach_mm)
+        self.at = unknown[self.used]
+        rows = energy[self.at]
+        self.factor, self.known = Factorization(rows[:, self.at]), rows[:, ~self.at]
+
+    def __call__(self, values):
+        """(n, d) for values (h, d) at the handles."""
+        field = np.zeros((self.n, values.shape[1]))
+        field[self.handles] = values
+        if self.used is not None:
+            field[self.used[self.at]] = self.factor.solve(-(self.known @ field[self.used[~self.at]]))
         return field
-    near = unknown.copy()
-    near[F[unknown[F].any(axis=1)].ravel()] = True
-    faces = F[near[F].any(axis=1)]  # two rings: enough for L M^-1 L at the unknowns
-    used, local = np.unique(faces, return_inverse=True)
-    energy = _bending(V[used], local.reshape(-1, 3), reach_mm)
-    at = unknown[used]
-    rows = energy[at]
-    field[used[at]] = Factorization(rows[:, at]).solve(-(rows[:, ~at] @ field[used[~at]]))
-    return field
+
+
+class SoftSpread:
+    """Displacements of least bending that follow wishes of some vertices, factored anew for each set of wishes.
+
+    Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free.
+    V (n, 3), F (m, 3), free (n,) bool; reach_mm: the field fades over this distance
+    """
+
+    def __init__(self, V, F, free, reach_mm=5.0):
+        self.free, self._n = np.flatnonzero(free), len(V)
+        self._energy = _bending(V, F, reach_mm)[self.free][:, self.free]
+
+    def __call__(self, wishes, weights, smooth_mm=1.0):
+        """(n, 3) field for wishes (n, 3) with weights (n,); a vertex of weight 0 wishes for nothing.
+
+        smooth_mm  width over which one vertex with w = 1 mm^2 is felt
+        """
+        w = weights[self.free]
+        field = np.zeros((self._n, 3))
+        field[self.free] = Factorization(smooth_mm**4 * self._energy + sp.diags(w)).solve(
+            w[:, None] * wishes[self.free]
+        )
+        return field
 
 
 def _bending(V, F, reach_mm):

@@ -11,6 +11,8 @@ from facewright.parts.fit import fit_skeleton
 from facewright.parts.iris import EyeLook, paint_eye
 from facewright.parts.paint import PAINTERS
 from facewright.transfer.eyeball import measure_eyeball
+from facewright.transfer.halves import split_in_halves
+from facewright.working_set import read_working_set
 
 _STILL_MM = 1e-6
 SKIN_MAPS = ("albedo", "normal")
@@ -32,7 +34,7 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
 
     deltas  (s, n, 3) mm from face.vertices, in the order of face.template.shape_names
     maps    name -> (h, w, c) uint8 of the skin; "albedo" and "normal" go on its material, others are left to textures/
-    eyes    contact.EyeShapes whose in-betweens and correctives the rig shall have; deltas are then eyes.deltas
+    eyes    contact.Targets whose in-betweens and correctives the rig shall have; deltas are then eyes.deltas
     returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
     """
     options = options or AssemblyOptions()
@@ -41,10 +43,13 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
         options = replace(options, eyes=replace(options.eyes, iris_color=tuple(seen)))
     maps = maps or {}
     template = face.template
-    names = template.shape_names
-    if eyes is not None and eyes.extras:
-        names = (*names, *eyes.extras)
-        deltas = np.concatenate([deltas, np.stack(list(eyes.extras.values()))])
+    words = read_working_set()
+    targets = dict(zip(template.shape_names, deltas)) | (eyes.extras if eyes is not None else {})
+    in_betweens = eyes.in_betweens if eyes is not None else {}
+    halves = words.halves(template.shape_names)
+    made, passed = split_in_halves(template, targets, halves, in_betweens)
+    targets |= made
+    deltas = np.stack(list(targets.values()))
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
     meshes = []
     for part in template.parts:
@@ -56,14 +61,17 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     n_skin = template.skin.vertices[1]
     return Rig(
         meshes=tuple(meshes),
-        target_names=names,
+        target_names=tuple(targets),
         skeleton=fit_skeleton(template, face.vertices),
         maps=used,
         regions={name: mask[:n_skin] for name, mask in face.regions.items()},
         lines={name: line for name, line in face.lines.items() if (np.asarray(line) < n_skin).all()},
         info=rig_info(template),
-        in_betweens=eyes.in_betweens if eyes is not None else {},
+        in_betweens=in_betweens | passed,
         correctives=eyes.correctives if eyes is not None else {},
+        halves=halves,
+        expressions=words.expressions,
+        visemes=words.visemes,
     )
 
 

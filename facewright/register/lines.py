@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.ndimage import binary_opening, gaussian_filter1d, median_filter
 
 from facewright.mesh.raster import RayScene
 
 # A valley this deep is plain in clay; a line this much darker than its sides is plain in a photograph. In a shallow
 # valley the photograph decides, in a deep one the shape does.
 DEEP_MM, DARK = 0.6, 0.06
+WEAK_MM = 2.0
 
 
 @dataclass(frozen=True)
@@ -168,11 +169,14 @@ def _best_path(strength, offsets, options):
 
 
 def _ends(strength, columns, model_start, model_end, options):
-    """Column range of the crease: it ends where its strength stays under a quarter of the middle's."""
+    """Column range of the crease: it ends where its strength stays under a quarter of the middle's for WEAK_MM."""
     smooth = gaussian_filter1d(strength, 0.8 / options.step_mm)
     width = model_end - model_start
     core = (columns > model_start + 0.2 * width) & (columns < model_end - 0.2 * width)
     weak = smooth < 0.25 * np.median(smooth[core])
+    # A short weak stretch is a blemish of the scan, not the end; what lies past the search's own ends is unknown.
+    length = round(WEAK_MM / options.step_mm)
+    weak = binary_opening(np.pad(weak, length, constant_values=True), np.ones(length))[length:-length]
     left = np.flatnonzero(weak & (columns < model_start + 0.2 * width))
     right = np.flatnonzero(weak & (columns > model_end - 0.2 * width))
     start = left.max() + 1 if len(left) else 0

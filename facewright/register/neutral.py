@@ -15,6 +15,8 @@ REMOVE_FROM = 0.25
 # rest gives its place and only the smooth part of the person's own shape is carried on.
 KEEP_MM = 0.8
 HOLD_FROM_MM = 22.0
+# Of the template's aperture: modelled eyes look alert; opened as wide, a face that was scanned asleep stares.
+RELAXED = 0.88
 
 
 def take_out_expression(template, model, fit_skin, expression):
@@ -52,13 +54,13 @@ def take_out_expression(template, model, fit_skin, expression):
 
 
 def _template_aperture(template, skin, faces, side):
-    """Skin (n, 3) whose lids open as far, for the width of the eye, as the template's; shut lids do not tell."""
+    """Skin (n, 3) whose lids open nearly as far, for the width of the eye, as the template's; shut lids do not tell."""
     upper, lower = template.lines[f"lid_upper_{side}"], template.lines[f"lid_lower_{side}"]
     over = np.interp(arc_fractions(skin[upper]), arc_fractions(skin[lower]), np.arange(len(lower)))
     partner = lower[np.rint(over).astype(int)]
     opening = [np.linalg.norm(v[upper] - v[partner], axis=1).max() for v in (skin, template.vertices)]
     width = [np.linalg.norm(v[upper[0]] - v[upper[-1]]) for v in (skin, template.vertices)]
-    excess = 1.0 - opening[1] * width[0] / width[1] / max(opening[0], 1e-6)
+    excess = 1.0 - RELAXED * opening[1] * width[0] / width[1] / max(opening[0], 1e-6)
     # The lower lid stays: on shut eyes it is where it was.
     n = len(skin)
     near = np.linalg.norm(skin - skin[upper].mean(axis=0), axis=1)

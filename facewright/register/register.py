@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from facewright.data import Face
+from facewright.mesh.adjacency import dilate
+from facewright.mesh.intersect import self_intersections
+from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
-from facewright.mesh.untangle import untangled
+from facewright.mesh.untangle import unfolded, untangled
 from facewright.register.correspond import Target
 from facewright.register.interior import tuck_interior
 from facewright.register.leading import leading_lines
@@ -25,6 +28,9 @@ SIDES = {"left": "Left", "right": "Right"}
 # How far a smile strays from rest, and shut lids from the template's blink.
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
+# Rings of vertices around a knot in which everything gives way, tried in turn.
+GIVING_WAY = (0, 1, 2, 3)
+FOLD_MM = 3.0  # a face is only held to look as the scan does where the scan is this near
 KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
@@ -65,16 +71,15 @@ def register(scan, landmarks, template, options=None, placed=()):
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
     interior, outer, led = _interior(template)
     fit = model.vertices.copy()
-    steady = ~np.any([template.regions[name][:stop] for name in KNOTTY], axis=0)
-    steady[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
-    fit[:stop] = untangled(tuck_interior(skin, faces, interior, outer, led), faces, steady)
+    fit[:stop] = _without_knots(template, tuck_interior(skin, faces, interior, outer, led), faces)
+    fit[:stop] = _unfolded(template, fit[:stop], faces, matches)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
         rest, removed = take_out_expression(template, model, fit[:stop], expression)
         if removed:
             neutral = model.rest.copy()
-            neutral[:stop] = untangled(tuck_interior(rest, faces, interior, outer, led), faces, steady)
+            neutral[:stop] = _without_knots(template, tuck_interior(rest, faces, interior, outer, led), faces)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
@@ -133,6 +138,55 @@ def _fit_model(template, target, pairs, closed, options):
         options,
     )
     return model, names
+
+
+def _unfolded(template, skin, faces, matches):
+    """Skin (n, 3) without faces of the lips that look away from the scan, as in the groove at a corner."""
+    n = len(skin)
+    asked = (template.regions["lips"] & template.regions["outer"])[:n] & (matches.distance < FOLD_MM)
+    expected = normalized(matches.normals[faces].sum(axis=1)) * asked[faces].all(axis=1)[:, None]
+    keep = np.zeros(n, bool)
+    keep[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
+    return unfolded(skin, faces, expected, keep)
+
+
+def _without_knots(template, skin, faces):
+    """Skin (n, 3) with the knots of lips and lids smoothed away.
+
+    The lip seam and the skin beside them hold; what lies around a knot gives way only where it does not come loose.
+    """
+    n = len(skin)
+    knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
+    seam = np.zeros(n, bool)
+    seam[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
+    in_face = template.regions["face"][:n][faces].all(axis=1)
+
+    def crossing(vertices):
+        pairs = self_intersections(vertices, faces)
+        return np.unique(pairs[in_face[pairs].any(axis=1)])
+
+    best = untangled(skin, faces, ~knotty | seam)
+    left = crossing(best)
+    knot = np.zeros(n, bool)
+    knot[faces[left].ravel()] = True
+    for rings in GIVING_WAY:
+        if not len(left):
+            break
+        tried = _closed_as(skin, untangled(skin, faces, (~knotty | seam) & ~dilate(knot, faces, rings)), template)
+        remaining = crossing(tried)
+        if len(remaining) < len(left):
+            best, left = tried, remaining
+    return best
+
+
+def _closed_as(before, after, template):
+    """Skin (n, 3) after smoothing, with paired lip points as far apart as they were before."""
+    upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
+    half = (before[upper] - before[lower]) / 2
+    middle = (after[upper] + after[lower]) / 2
+    closed = after.copy()
+    closed[upper], closed[lower] = middle + half, middle - half
+    return closed
 
 
 def _hidden(rules, observed):

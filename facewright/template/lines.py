@@ -14,7 +14,7 @@ from facewright.mesh.adjacency import border_loops
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.raster import RayScene
-from facewright.template.lips import lip_sides
+from facewright.mesh.seam import seam_sides
 from facewright.template.loops import paired, separating_loop, shortest_path, split_loop, straightened
 from facewright.template.regions import Loops, enclosed, eye_pouch, mouth_bag, polygons_within, seen_from_inside
 
@@ -106,7 +106,7 @@ def _chains(head, lips):
 
 def _gap_between(head, chains):
     """(n,) mm from each lip vertex to the other lip; inf elsewhere."""
-    sides = lip_sides(head.vertices, head.faces, *chains)
+    sides = seam_sides(head.vertices, head.faces, *chains)
     gap = np.full(len(head.vertices), np.inf)
     for mine, other in (sides, sides[::-1]):
         patch = head.faces[other[head.faces].all(axis=1)]

@@ -4,35 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.closest import Surface
 from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass, uniform_laplacian
 from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.seam import seam_sides
 from facewright.mesh.untangle import untangled
 from facewright.solve.quadratic import Factorization
-
-
-def lip_sides(vertices, faces, upper, lower, reach_mm=8.0):
-    """Masks (n,) of the upper and the lower lip: within reach_mm of the seam, nearer along the skin to that side.
-
-    upper, lower (k,) the paired seam lines with shared ends; the ends belong to neither lip
-    """
-    n = len(vertices)
-    edges = unique_edges(faces)
-    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    graph = sp.coo_matrix((length, (edges[:, 0], edges[:, 1])), shape=(n, n)).tocsr()
-    away = [
-        dijkstra(graph, directed=False, indices=line[1:-1], min_only=True, limit=reach_mm) for line in (upper, lower)
-    ]
-    near = np.minimum(*away) < reach_mm
-    is_upper, is_lower = near & (away[0] < away[1]), near & (away[1] < away[0])
-    corners = [upper[0], upper[-1]]
-    is_upper[corners] = is_lower[corners] = False
-    return is_upper, is_lower
-
 
 PIN = 1e3  # weight of a point that is put where it belongs, against 1 mm2 of smoothness
 
@@ -95,7 +74,7 @@ def _contacts(vertices, faces, upper, lower, touch_mm):
         - sp.csr_matrix((np.ones(k), (np.arange(k), b)), shape=(k, n))
     )
     blocks = [pairs]
-    sides = lip_sides(vertices, faces, upper, lower)
+    sides = seam_sides(vertices, faces, upper, lower)
     for mine, other in (sides, sides[::-1]):
         patch = faces[other[faces].all(axis=1)]
         index = np.flatnonzero(mine)
@@ -118,7 +97,7 @@ def closed_lips(vertices, faces, upper, lower, *, radius_mm=14.0, gap_mm=0.04, r
     half; knots in the corners that are left after so many rounds are smoothed away.
     """
     seam = np.concatenate([upper, lower[1:-1]])
-    sides = lip_sides(vertices, faces, upper, lower)
+    sides = seam_sides(vertices, faces, upper, lower)
     spread = SoftSpread(vertices, faces, seam, radius=radius_mm)
     a, b = upper[1:-1], lower[1:-1]
     field = np.zeros_like(vertices)

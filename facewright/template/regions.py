@@ -25,7 +25,7 @@ from facewright.solve.quadratic import Factorization
 from facewright.template.loops import separating_loop, shortest_path
 
 EYE_DISTANCE_MM = 63.0  # lengths below are for a head whose eyes are this far apart
-HAIRLINE = 0.62  # height of the hairline above the eyes, in distances from eyes to chin
+HAIRLINE = 0.68  # height of the hairline above the eyes, in distances from eyes to chin
 
 
 @dataclass(frozen=True)

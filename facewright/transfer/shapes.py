@@ -15,6 +15,7 @@ from facewright.solve.procrustes import best_rotation, best_similarity
 from facewright.transfer.deformation import DeformationTransfer, Links
 from facewright.transfer.lids import ContactOptions, clear_lids
 from facewright.transfer.riders import ride_on_lids
+from facewright.transfer.strength import line_strengths
 
 CORRECTIVE_BASE = {"mouthClose": "jawOpen"}
 """Shapes that are made on top of another one and mean nothing without it."""
@@ -28,11 +29,13 @@ _RIGID_SKIN_MM = 2.0  # skin that strays by this from the jaw's rigid motion cou
 class TransferOptions:
     """w_lids  how firmly the two lid margins keep their relation (closing stays closing); 0: not at all
     w_lips  the same for the line where the lips meet
+    strengths whether the mouth's feature lines set how strong each shape is
     contact how lids are kept out of the eyeballs; None: not at all
     """
 
     w_lids: float = 5.0
     w_lips: float = 1.0
+    strengths: bool = True
     contact: ContactOptions | None = field(default_factory=ContactOptions)
 
 
@@ -55,11 +58,26 @@ def transfer_shapes(face, options=None):
     result = np.zeros(template.deltas.shape)
     scale = best_similarity(template.vertices[:stop], V[:stop])[1]
     result[:, :stop] = _skin_shapes(skin, template.deltas[:, :stop], template.shape_names, scale)
+    if options.strengths:
+        result[:, :stop] *= _strengths(face, skin.rotation, result[:, :stop])[:, None, None]
     _carry_bones(template, V, skin.rotation, result)
     if options.contact is not None:
         result = clear_lids(face, result, options.contact)
     _carry_the_rest(template, V, skin.rotation, result)
     return ride_on_lids(face, result, template.shape_names)
+
+
+def _strengths(face, rotation, carried):
+    """(s,) factors of strength.line_strengths; 1 for what goes with the jaw, which turns by its own angle."""
+    template = face.template
+    stop = template.skin.vertices[1]
+    source, deltas = template.vertices[:stop], template.deltas[:, :stop]
+    factors = line_strengths(source, face.vertices[:stop], deltas, carried, face.lines, rotation)
+    jaw = [part.vertex_slice for part in template.parts if part.attach == "jaw"]
+    motion = [np.abs(template.deltas[:, part]).max(axis=(1, 2)) for part in jaw]
+    with_jaw = np.max([np.zeros(len(factors)), *motion], axis=0) > _REST_MM
+    corrective = [name in CORRECTIVE_BASE for name in template.shape_names]
+    return np.where(with_jaw | np.array(corrective), 1.0, factors)
 
 
 def even_handed(faces, mirror):
@@ -74,6 +92,19 @@ def even_handed(faces, mirror):
     alone = ~np.isin(twin_keys, keys)
     weights = np.where(alone, 0.5, 1.0)
     return np.concatenate([faces, twins[alone]]), np.append(weights, np.full(alone.sum(), 0.5))
+
+
+def even_cut(faces, mirror, x):
+    """Triangles (m, 3) with quads cut on the right as on the left, so that a head's sides are meshed alike.
+
+    x (n,) of the template's vertices; quads across the midline stay as they are
+    """
+    twins = mirror[faces][:, [0, 2, 1]]
+    n = len(mirror)
+    keys, twin_keys = (np.sort(F, axis=1) @ [n * n, n, 1] for F in (faces, twins))
+    alone = ~np.isin(twin_keys, keys)
+    left, right = (x[faces] >= -1e-6).all(axis=1), (x[faces] <= 1e-6).all(axis=1)
+    return np.concatenate([faces[~(alone & right)], twins[alone & left]])
 
 
 def feature_links(lines, vertices, options=None):

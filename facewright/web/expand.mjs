@@ -1,11 +1,21 @@
 // The twin of facewright/expand.py: pose weights to the weights of all targets.
-// inBetweens: shape -> {weight: target}; correctives: target -> [drivers].
-export function expandWeights(poseWeights, inBetweens, correctives) {
+// inBetweens: shape -> {weight: target}; correctives: target -> [drivers]; halves: sum -> [left, right].
+export function expandWeights(poseWeights, inBetweens, correctives, halves = {}) {
+  const pose = { ...poseWeights };
+  for (const [name, parts] of Object.entries(halves)) {
+    const weight = pose[name] ?? 0;
+    delete pose[name];
+    if (weight !== 0) for (const part of parts) pose[part] = (pose[part] ?? 0) + weight;
+  }
+  const drive = { ...pose };
+  for (const [name, parts] of Object.entries(halves)) {
+    drive[name] = parts.reduce((sum, part) => sum + (pose[part] ?? 0), 0) / parts.length;
+  }
   const result = {};
   const add = (name, weight) => {
     if (weight !== 0) result[name] = (result[name] ?? 0) + weight;
   };
-  for (const [name, weight] of Object.entries(poseWeights)) {
+  for (const [name, weight] of Object.entries(pose)) {
     const steps = Object.entries(inBetweens[name] ?? {}).map(([at, target]) => [Number(at), target]);
     const stops = [[0, null], ...steps.sort((a, b) => a[0] - b[0]), [1, name]];
     let piece = 1;
@@ -16,7 +26,7 @@ export function expandWeights(poseWeights, inBetweens, correctives) {
     add(high[1], share);
   }
   for (const [target, drivers] of Object.entries(correctives)) {
-    add(target, drivers.reduce((product, driver) => product * Math.min(Math.max(poseWeights[driver] ?? 0, 0), 1), 1));
+    add(target, drivers.reduce((product, driver) => product * Math.min(Math.max(drive[driver] ?? 0, 0), 1), 1));
   }
   return result;
 }

@@ -6,7 +6,7 @@ Written by hand (struct and json), because the libraries at hand know no morph t
 - vertices are doubled at UV seams only, and normals are computed before that, so no seam shows in the light;
 - every target carries POSITION and NORMAL deltas in dense accessors with a buffer view of their own, zeros too:
   viewers have stumbled over sparse, interleaved and view-less morph data;
-- names in mesh.extras.targetNames; a mesh either has all targets of the rig or none;
+- names in mesh.extras.targetNames, how to play them in the scene's extras; a mesh has all targets of the rig or none;
 - joints are moved onto a grid of 2^-20 m, on which their sums and differences are exact in float32: at rest the
   skinning matrices are the identity to the bit;
 - meshes with a normal map carry tangents by the rule the map was baked with, since viewers' own derivations differ;
@@ -63,6 +63,7 @@ def gltf_bytes(rig, options=GltfOptions()):
         material = document.add_material(mesh.material, textures, _see_through(rig, mesh.material))
         primitive = split_at_seams(mesh, tangents=options.tangents and mesh.material.normal is not None)
         document.add_mesh(mesh.name, primitive, material, joints, rig.target_names)
+    document.add_scene_extras(_how_to_play(rig))
     return document.to_bytes()
 
 
@@ -71,6 +72,20 @@ def _asset(rig):
     if rig.info.get("copyright"):
         asset["copyright"] = str(rig.info["copyright"])
     return asset
+
+
+def _how_to_play(rig):
+    """What a player needs beside the targets: the tables of expand_weights, the expressions and the visemes."""
+    tables = {
+        "inBetweens": {
+            name: {f"{at:g}": target for at, target in steps.items()} for name, steps in rig.in_betweens.items()
+        },
+        "correctives": {name: list(drivers) for name, drivers in rig.correctives.items()},
+        "halves": {name: list(sides) for name, sides in rig.halves.items()},
+        "expressions": rig.expressions,
+        "visemes": rig.visemes,
+    }
+    return {"facewright": tables} if any(tables.values()) else {}
 
 
 @dataclass(frozen=True)
@@ -302,6 +317,11 @@ class _Document:
         node_name = f"{name}_mesh" if name in taken else name  # a joint "eye_left" has its name first
         node = {"name": node_name, "mesh": self._append("meshes", mesh), "skin": skin}
         self._json["scenes"][0]["nodes"].append(self._append("nodes", node))
+
+    def add_scene_extras(self, extras):
+        """Data of the application's own, on the scene: viewers hand it on."""
+        if extras:
+            self._json["scenes"][0]["extras"] = extras
 
     def to_bytes(self):
         """The document as GLB: header, JSON chunk, binary chunk."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 from PIL import Image
@@ -13,6 +14,7 @@ from facewright.mesh.normals import vertex_normals
 from facewright.mesh.raster import Camera
 from facewright.mesh.render import srgb_to_linear
 from facewright.mesh.scene import CLAY_LINEAR, Drawable, Scene
+from facewright.write.close_ups import close_up_sections
 from facewright.write.files import replace_file
 from facewright.write.sheet import PANEL, Cell, Section, color_bar, compose_sheet
 
@@ -33,6 +35,8 @@ INNER_SHADE = 0.45
 def write_preview(rig, scan, face, path, jobs=2):
     """Write a contact sheet of a Rig (data.Rig) made from a Scan through a Face, as PNG.
 
+    The whole face is shown under the plain shapes, the close-ups as in-betweens and correctives play them.
+
     scan  in our frame, as the face was fitted to it; jobs is the number of threads, which changes no pixel
     """
     sheet = preview_sheet(rig, scan, face, jobs)
@@ -43,6 +47,7 @@ def write_preview(rig, scan, face, path, jobs=2):
 
 def preview_sheet(rig, scan, face, jobs=2):
     """The contact sheet as (h, w, 3) uint8."""
+    played, rig = rig, rig.plain()
     scenes = {
         "scan": Scene(scan_drawables(scan, textured=True)),
         "rig": Scene(rig_drawables(rig, textured=True)),
@@ -58,12 +63,14 @@ def preview_sheet(rig, scan, face, jobs=2):
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         rendered = pool.map(lambda job: _picture(scenes[job[0]], job[2]), wanted)
         pictures = {(name, view): picture for (name, view, _), picture in zip(wanted, rendered)}
+        closer = close_up_sections(played, partial(rig_drawables, textured=False), _picture, pool.map)
         shapes = list(pool.map(lambda t: _shape_cell(rig, t, thumbnail_camera), range(-1, len(rig.target_names))))
     sections = [
         _neutral_section(pictures, scan),
         _close_up_section(pictures, face),
         _fit_section(pictures),
         _shape_section(shapes),
+        *closer,
     ]
     triangles = sum(len(mesh.faces) for mesh in rig.meshes)
     subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(rig.target_names)} shapes"

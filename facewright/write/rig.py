@@ -90,6 +90,9 @@ def _describe(rig):
         "lines": list(rig.lines),
         "in_betweens": {name: list(map(list, steps.items())) for name, steps in rig.in_betweens.items()},
         "correctives": {name: list(drivers) for name, drivers in rig.correctives.items()},
+        "halves": {name: list(sides) for name, sides in rig.halves.items()},
+        "expressions": rig.expressions,
+        "visemes": rig.visemes,
         "info": rig.info,
     }
 
@@ -124,6 +127,9 @@ def _unpack(description, arrays, folder):
         info=description["info"],
         in_betweens={name: dict(steps) for name, steps in description["in_betweens"].items()},
         correctives={name: tuple(drivers) for name, drivers in description["correctives"].items()},
+        halves={name: tuple(sides) for name, sides in description.get("halves", {}).items()},
+        expressions=description.get("expressions", {}),
+        visemes=description.get("visemes", {}),
     )
 
 

@@ -52,20 +52,6 @@ def test_the_far_wall_of_a_narrow_crease_is_no_fold():
     assert not len(quality.folded_faces(scan, fit, faces, np.ones(len(faces), bool)))
 
 
-def test_turning_a_head_folds_no_shape():
-    vertices, faces = sheet()
-    curved = vertices + np.stack([0 * vertices[:, 0], 0 * vertices[:, 0], 0.1 * vertices[:, 0] ** 2], axis=1)
-    assert not len(quality.folded_by_shape(curved, curved @ turn(170).T, faces))
-
-
-def test_a_shape_that_turns_a_face_over_is_found():
-    vertices, faces = sheet()
-    moved = vertices.copy()
-    moved[7 * 15 + 7] += [2.5, 0.0, 0.0]
-    turned = np.cross(*np.moveaxis(np.diff(moved[faces], axis=1), 1, 0))[:, 2] < 0
-    assert np.array_equal(quality.folded_by_shape(vertices, moved, faces), np.flatnonzero(turned))
-
-
 def test_torn_edges_need_both_length_and_factor():
     vertices, faces = sheet()
     moved = vertices.copy()

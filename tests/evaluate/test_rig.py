@@ -7,6 +7,7 @@ import pytest
 
 from facewright import data
 from facewright.evaluate import rig as measure
+from facewright.evaluate.shapes import measure_shapes
 
 
 @pytest.fixture
@@ -40,9 +41,9 @@ def flat_rig(small_rig):
 
 
 def test_only_the_broken_shape_is_reported(flat_rig):
-    shapes = measure.measure_shapes(flat_rig)
+    shapes = measure_shapes(replace(flat_rig, in_betweens={}, correctives={}))
     names = flat_rig.target_names
-    assert shapes[names[0]] == {"max_mm": 3.0, "folded": 0, "torn": 0, "crossing": 0}
+    assert shapes[names[0]] == {"max_mm": 3.0, "folded": 0, "torn": 0, "self_intersections": 0}
     assert shapes[names[1]]["folded"] > 0
     assert shapes[names[2]]["max_mm"] == 0.0
 

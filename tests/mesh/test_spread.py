@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facewright.mesh.spread import spread_smoothly
+from facewright.mesh.spread import SoftSpread, spread_smoothly
 
 
 @pytest.fixture
@@ -42,3 +42,14 @@ def test_a_linear_field_needs_no_bending_unless_it_must_fade(grid):
     assert np.allclose(spread_smoothly(V, F, handles, linear[handles], everywhere), linear, atol=1e-8)
     faded = spread_smoothly(V, F, handles, linear[handles], everywhere, reach_mm=2.0)
     assert np.abs(faded[220]) < 0.5 * np.abs(linear[220])
+
+
+def test_wishes_are_met_softly_and_fade(grid):
+    V, F = grid
+    free = np.linalg.norm(V - [10, 10, 0], axis=1) < 9
+    wishes, weights = np.zeros((441, 3)), np.zeros(441)
+    wishes[220], weights[220] = [0, 0, 1], 100.0
+    soft = SoftSpread(V, F, free, reach_mm=4.0)
+    narrow, wide = soft(wishes, weights, 0.5)[:, 2], soft(wishes, weights, 2.0)[:, 2]
+    assert narrow[220] > 0.95 and wide[220] < narrow[220]
+    assert not narrow[~free].any() and not soft(0 * wishes, weights).any()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from facewright.conventions import ARKIT_SHAPES
+from facewright.expand import expand_weights
 from facewright.parts import AssemblyOptions, build_rig, fit_parts
 from facewright.parts.iris import EyeLook, eye_colors, paint_eye
 from facewright.transfer.eyeball import measure_eyeball
@@ -34,10 +35,22 @@ def test_one_mesh_per_part_and_the_skin_first(hm08, rig, person):
 
 
 def test_targets_are_all_or_none(rig):
-    assert rig.target_names == ARKIT_SHAPES
+    assert rig.plain().target_names == ARKIT_SHAPES
     by_name = {mesh.name: mesh for mesh in rig.meshes}
     assert by_name["teeth_upper"].deltas is None
-    assert all(len(by_name[name].deltas) == 52 for name in ("skin", "eye_left", "teeth_lower", "tongue"))
+    assert all(len(by_name[name].deltas) == 52 + 16 for name in ("skin", "eye_left", "teeth_lower", "tongue"))
+
+
+def test_the_full_rig_has_halves_in_place_of_their_sums(rig):
+    full, skin = rig.full(), rig.meshes[0]
+    assert len(full.target_names) == 60 and not set(full.halves) & set(full.target_names)
+    at = ARKIT_SHAPES.index("mouthFunnel")
+    assert full.target_names[at : at + 2] == ("mouthFunnelLeft", "mouthFunnelRight")
+    for pose in ({"cheekPuff": 0.6, "jawOpen": 0.2}, *rig.expressions.values()):
+        played = expand_weights(pose, full.in_betweens, full.correctives, full.halves)
+        moved = sum(w * full.meshes[0].deltas[full.target_names.index(name)] for name, w in played.items())
+        meant = sum(w * skin.deltas[rig.target_names.index(name)] for name, w in pose.items())
+        assert np.abs(moved - meant).max() < 1e-9
 
 
 def test_parts_hang_on_their_bones(rig):

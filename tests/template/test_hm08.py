@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from facewright.conventions import ARKIT_SHAPES, mirrored_name
-from facewright.evaluate.quality import lip_gaps_mm, self_intersections, visible_interior_mm2
+from facewright.evaluate.quality import (
+    folded_by_shape,
+    lip_gaps_mm,
+    self_intersections,
+    torn_edges,
+    visible_interior_mm2,
+)
 from facewright.evaluate.uv import measure_uv
 from facewright.mesh.adjacency import border_loops, half_edges, unique_edges
 from facewright.template.store import SHIPPED
@@ -139,6 +145,45 @@ def test_shapes_are_symmetric_and_leave_the_skull_alone(hm08):
         assert not delta[hm08.regions["skull"]].any()
     blink = hm08.shape("eyeBlinkLeft")
     assert not blink[hm08.regions["socket_right"] | hm08.regions["mouth_interior"]].any()
+
+
+def test_no_shape_folds_or_tears(hm08, skin_faces):
+    n = hm08.skin.vertices[1]
+    neutral, inside = hm08.vertices[:n], hm08.regions["mouth_interior"][:n]
+    for name in ARKIT_SHAPES:
+        pose = hm08.shape(name)[:n] + (hm08.shape("jawOpen")[:n] if name == "mouthClose" else 0.0)
+        if not name.startswith("eye"):  # lids are made anew on each head
+            assert not len(folded_by_shape(neutral, neutral + pose, skin_faces, ~inside[skin_faces].any(axis=1))), name
+        assert not len(torn_edges(neutral, neutral + pose, skin_faces, ~inside)), name
+
+
+def test_sizes_of_shapes(hm08):
+    corner = hm08.lines["lip_seam_upper"][-1]
+    assert 13.0 < np.linalg.norm(hm08.shape("mouthSmileLeft")[corner]) < 18.0
+    chin = hm08.regions["face"] & (hm08.mirror == np.arange(len(hm08.mirror)))
+    assert 35.0 < np.linalg.norm(hm08.shape("jawOpen")[chin], axis=1).max() < 42.0
+    assert hm08.shape("mouthPucker")[hm08.lines["lip_seam_upper"], 2].min() > 7.0
+    assert hm08.shape("noseSneerLeft")[hm08.lines["nostril_left"], 1].mean() > 4.0
+
+
+def test_shapes_stay_where_they_belong(hm08):
+    above = hm08.vertices[:, 1] > hm08.vertices[hm08.lines["lid_upper_left"], 1].max()
+    right = hm08.vertices[:, 0] < hm08.vertices[hm08.lines["lip_seam_upper"], 0].min()
+    for name in ARKIT_SHAPES:
+        delta = np.linalg.norm(hm08.shape(name), axis=1)
+        assert delta[hm08.lines["neck_ring"]].max() == 0.0
+        if name.startswith(("mouth", "jaw", "cheekPuff")):
+            assert delta[above].max() < 0.1, name
+        if name.endswith("Left") and name not in ("mouthLeft", "jawLeft"):
+            assert delta[right].max() < 0.1, name
+
+
+def test_closed_lips_stay_closed(hm08):
+    for name in ("mouthSmile", "mouthFrown", "mouthDimple", "mouthStretch", "mouthPress"):
+        pose = hm08.vertices + hm08.shape(f"{name}Left") + hm08.shape(f"{name}Right")
+        assert lip_gaps_mm(pose, hm08.lines).max() < 0.5, name
+    pose = hm08.vertices + hm08.shape("jawOpen") + hm08.shape("mouthClose")
+    assert lip_gaps_mm(pose, hm08.lines).max() < 0.3
 
 
 @pytest.mark.parametrize(

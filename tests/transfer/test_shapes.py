@@ -9,7 +9,7 @@ from facewright.conventions import mirrored_name
 from facewright.data import Face
 from facewright.parts import fit_parts
 from facewright.solve.procrustes import best_rotation, best_similarity
-from facewright.transfer.shapes import TransferOptions, even_handed, feature_links, transfer_shapes
+from facewright.transfer.shapes import TransferOptions, even_cut, even_handed, feature_links, transfer_shapes
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 TURNED = {"jawLeft": "jawRight", "mouthLeft": "mouthRight"}
@@ -137,3 +137,13 @@ def test_eyelids_do_not_follow_the_jaw(hm08, hm08_person):
         motion = np.linalg.norm(transfer_shapes(fit_parts(hm08_person(seed)))[k], axis=1)
         still = np.linalg.norm(hm08.deltas[k], axis=1) < 0.05
         assert motion[still & hm08.regions["skin"]].max() < 0.12
+
+
+def test_quads_are_cut_alike_on_both_sides():
+    x = np.array([1.0, 2.0, 2.0, 1.0, -1.0, -2.0, -2.0, -1.0])
+    mirror = np.array([4, 5, 6, 7, 0, 1, 2, 3])
+    left, right = [[0, 1, 2], [0, 2, 3]], [[5, 4, 7], [5, 7, 6]]  # 4, 5, 6, 7 runs the other way round
+    cut = even_cut(np.array(left + right), mirror, x)
+    keys = {tuple(sorted(face)) for face in cut}
+    assert keys == {tuple(sorted(mirror[list(face)])) for face in keys} and len(cut) == 4
+    assert {(0, 1, 2), (0, 2, 3)} <= keys

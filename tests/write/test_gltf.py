@@ -41,6 +41,9 @@ def test_document_says_what_engines_ask_for(small_rig, tmp_path):
         accessor = document["accessors"][target["POSITION"]]
         assert "min" in accessor and "max" in accessor and "bufferView" in accessor and "sparse" not in accessor
         assert "bufferView" in document["accessors"][target["NORMAL"]]
+    tables = document["scenes"][0]["extras"]["facewright"]
+    assert tables["visemes"] == small_rig.visemes and tables["expressions"] == small_rig.expressions
+    assert tables["inBetweens"] == {"jawOpen": {"0.5": "mouthClose"}}
     assert "extras" not in document["meshes"][1] and "targets" not in document["meshes"][1]["primitives"][0]
     assert all(material["pbrMetallicRoughness"]["metallicFactor"] == 0 for material in document["materials"])
     assert document["materials"][1]["alphaMode"] == "BLEND" and document["materials"][1]["doubleSided"]

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from facewright.conventions import ARKIT_SHAPES
 from facewright.pipeline import STAGES
 from facewright.write.report import peak_memory_mb, plain, write_json
 
@@ -82,3 +83,10 @@ def test_peak_memory_grows_with_what_is_held():
     before = peak_memory_mb()
     held = np.ones(30_000_000)
     assert peak_memory_mb() >= before and held[-1] == 1
+
+
+def test_every_shape_is_measured(report):
+    assert set(report["shapes"]) == set(ARKIT_SHAPES)
+    for figures in report["shapes"].values():
+        assert set(figures) == {"max_mm", "folded", "torn", "self_intersections"}
+    assert report["shapes"]["jawOpen"]["max_mm"] > 25 and report["shapes"]["jawOpen"]["folded"] == 0

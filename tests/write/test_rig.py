@@ -23,6 +23,8 @@ def test_read_gives_what_was_written(small_rig, tmp_path):
     assert (back.skeleton.names, back.skeleton.parents) == (small_rig.skeleton.names, small_rig.skeleton.parents)
     assert np.array_equal(back.skeleton.positions, small_rig.skeleton.positions)
     assert back.in_betweens == small_rig.in_betweens and back.correctives == small_rig.correctives
+    assert back.halves == small_rig.halves and back.visemes == small_rig.visemes
+    assert back.expressions == small_rig.expressions
     for kind in ("maps", "regions", "lines"):
         mine, theirs = getattr(small_rig, kind), getattr(back, kind)
         assert list(mine) == list(theirs) and all(np.array_equal(mine[k], theirs[k]) for k in mine)

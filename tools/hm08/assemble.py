@@ -24,7 +24,9 @@ from hm08.lids import lid_pieces
 from hm08.mouth import deepen_fold
 from hm08.parts import Piece, control_points, eye_pair, mouth_pieces, mouth_rows
 from hm08.regions import EAR_TARGETS, skin_regions
-from hm08.shapes import build_shapes, eye_turn, rigid_motion
+from hm08.shapes import build_shapes
+from hm08.shapes.eyes import eye_turn
+from hm08.shapes.jaw import rigid_motion
 from hm08.skeleton import build_skeleton, hinge_of, skin_weights
 from hm08.source import read_base, read_face_units, read_macros, read_modifiers
 from hm08.teeth import CELLS
@@ -120,8 +122,10 @@ def build_asset(source, *, say=lambda text: None):
     assembly, tongue_out = _assemble(head, uv, uv_polygons)
     say("shapes")
     raw = read_face_units(source, n_base, ARKIT_SHAPES)[:, control.original] * control.scale
-    skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions)
-    shapes, jaw = _with_parts(skin_deltas, raw, control, head, assembly, tongue_out)
+    turns = {name: _jaw_motion(name, raw, control) for name in JAW_SHAPES}
+    jaw = turns["jawOpen"]
+    skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions, jaw)
+    shapes = _with_parts(skin_deltas, turns, head, assembly, tongue_out)
     say("identity")
     names, fields = _carried(names, deltas, macros, control, head)
     operator = _operator(control, head, assembly)
@@ -154,27 +158,23 @@ def _assemble(head, uv, uv_polygons):
     return assembly, tongue_out
 
 
-def _with_parts(skin, raw, control, head, assembly, tongue_out):
-    """(52, n, 3) deltas of all parts, and the jaw's rigid motion (R, t) in jawOpen."""
+def _with_parts(skin, turns, head, assembly, tongue_out):
+    """(52, n, 3) deltas of all parts; turns: jaw shape -> (R, t)."""
     n = sum(len(v) for v in assembly.vertices)
     vertices = np.concatenate(assembly.vertices)
     deltas = np.zeros((len(ARKIT_SHAPES), n, 3))
     deltas[:, : skin.shape[1]] = skin
     on_jaw = np.concatenate([np.full(len(v), p.attach == "jaw") for p, v in zip(assembly.parts, assembly.vertices)])
-    jaw = None
-    for name in JAW_SHAPES:
-        R, t = _jaw_motion(name, raw, control)
-        if name == "jawOpen":
-            jaw = (R, t)
+    for name, (R, t) in turns.items():
         deltas[ARKIT_SHAPES.index(name), on_jaw] = (vertices @ R.T + t - vertices)[on_jaw]
-    _stick_out(deltas, assembly, tongue_out, jaw)
+    _stick_out(deltas, assembly, tongue_out, turns["jawOpen"])
     for i, name in enumerate(ARKIT_SHAPES):
         if name.startswith("eyeLook"):
             side = "eye_left" if name.endswith("Left") else "eye_right"
             center = head.eye_center * ([1, 1, 1] if side == "eye_left" else [-1, 1, 1])
             part = next(p for p in assembly.parts if p.name == side)
             deltas[i, part.vertex_slice] = eye_turn(name, vertices[part.vertex_slice], center)
-    return deltas, jaw
+    return deltas
 
 
 def _jaw_motion(name, raw, control):

@@ -1,0 +1,270 @@
+"""A packed set as a folder: PNG and KTX2 images, shaders, and facezip.json, which names every channel."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from facewright.compress.files import read_texture
+from facewright.compress.ktx2 import encoder_missing, raw_ktx2, texture_ktx2
+from facewright.compress.packed import Packed
+from facewright.compress.runtime import GLSL, HLSL
+from facewright.errors import InputError
+from facewright.write.files import file_name
+
+FORMAT = "facezip-1"
+INDEX = "facezip.json"
+HIDDEN = ".facezip-"
+LARGEST_SIDE = 16384
+# How hard PNG tries: 1 takes a quarter of the time of 6 and is 12 % larger (five images of 512 x 512).
+PNG_LEVEL = 1
+
+
+def write_packed(packed, folder, ktx2=None):
+    """Write a Packed, or a dict name -> Packed of several maps, into an existing folder.
+
+    ktx2     "bc7", "astc" or None: block-compressed images beside the PNG
+    returns  facezip.json as a dict
+    """
+    folder = Path(folder)
+    maps = packed if isinstance(packed, dict) else {"color": packed}
+    about = {"format": FORMAT, **_shared(next(iter(maps.values())))}
+    store, first = _Store(folder, ktx2), None
+    about["maps"] = {}
+    for number, (name, one) in enumerate(maps.items()):
+        prefix = "" if number == 0 else file_name(name) + "_"
+        entry = _write_map(store, one, prefix)
+        if first is None:
+            first, about["weights"] = one, _write_weights(store, one, "")
+        elif one.weights is not first.weights:
+            entry["weights"] = _write_weights(store, one, prefix)
+        about["maps"][name] = entry
+    about["bytes"] = store.totals()
+    store.text("facezip.glsl", GLSL)
+    store.text("facezip.hlsl", HLSL)
+    store.text(INDEX, json.dumps(about, indent=1))
+    return about
+
+
+def _shared(packed):
+    rows, columns = packed.weights.shape[1:3]
+    height, width = packed.neutral.shape[:2]
+    return {
+        "size": [width, height],
+        "meaning": "a stored code q stands for (q - zero) * step, in units of 1/255 of full scale for textures",
+        "origin": "row 0 is the top of the image; weights are upsampled bilinearly, clamped to the edge",
+        "weight_size": [columns, rows],
+        "weight_uv_scale": [width / (8 * columns), height / (8 * rows)],
+        "expressions": {name: int(layer) for name, layer in zip(packed.names, packed.layers)},
+    }
+
+
+def _write_map(store, packed, prefix):
+    channels = packed.neutral.shape[2]
+    return {
+        "channels": {1: "R", 2: "RG", 3: "RGB", 4: "RGBA"}[channels],
+        "bits": packed.neutral.dtype.itemsize * 8,
+        "colour_space": "as the input images; import as linear data, decode sRGB after facezip() where they were sRGB",
+        "neutral": store.image(f"{prefix}neutral", packed.neutral),
+        "differences": [
+            {**store.image(f"{prefix}difference{i}", image), "step": step, "zero": zero}
+            for i, (image, step, zero) in enumerate(
+                zip(packed.textures, packed.texture_step.tolist(), packed.texture_zero.tolist())
+            )
+        ],
+        "report": packed.report,
+    }
+
+
+def _write_weights(store, packed, prefix):
+    atlas = [
+        store.image(f"{prefix}weights{start // 4 or ''}", weight_atlas(packed, start), raw=True)
+        for start in range(0, len(packed.textures), 4)
+    ]
+    steps, zeros = packed.weight_step.tolist(), packed.weight_zero.tolist()
+    return {
+        "atlas": atlas,
+        "places": list(atlas_shape(*packed.weights.shape[:3])),
+        "layers": [{"step": step, "zero": zero} for step, zero in zip(steps, zeros)],
+    }
+
+
+def atlas_shape(count, rows, columns):
+    """(across, down) places of weight maps in one image: layer n lies at (n % across, n // across)."""
+    fits = [
+        (across * -(-count // across), max(across * columns, -(-count // across) * rows), across)
+        for across in range(1, count + 1)
+        if across * columns <= LARGEST_SIDE and -(-count // across) * rows <= LARGEST_SIDE
+    ]
+    if not fits:
+        raise InputError(
+            f"compress: {count} weight maps of {columns} x {rows} do not fit an image of {LARGEST_SIDE}; "
+            "split the set or use smaller textures"
+        )
+    across = min(fits)[2]
+    return across, -(-count // across)
+
+
+def weight_atlas(packed, start=0):
+    """(h, w, 4) uint8: the weight maps of difference textures start to start + 3, all layers in one image."""
+    layers, rows, columns, k = packed.weights.shape
+    across, down = atlas_shape(layers, rows, columns)
+    image = np.zeros((down, rows, across, columns, 4), np.uint8)
+    for n in range(layers):
+        image[n // across, :, n % across, :, : min(4, k - start)] = packed.weights[n, :, :, start : start + 4]
+    return image.reshape(down * rows, across * columns, 4)
+
+
+class _Store:
+    """Writes the files of a folder and adds up their bytes."""
+
+    def __init__(self, folder, ktx2):
+        self.folder, self.ktx2 = folder, ktx2
+        self.bytes = {"png": 0, "ktx2": 0, "memory": 0, "memory_ktx2": 0}
+
+    def image(self, name, pixels, raw=False):
+        """Write an image as PNG and KTX2; returns the names of the files."""
+        stream = io.BytesIO()
+        Image.fromarray(np.squeeze(pixels, 2) if pixels.shape[2] == 1 else pixels).save(
+            stream, "PNG", compress_level=PNG_LEVEL
+        )
+        self._write(f"{name}.png", stream.getbuffer())
+        self.bytes["png"] += stream.getbuffer().nbytes
+        self.bytes["memory"] += pixels.nbytes
+        if self.ktx2 is None:
+            return {"file": f"{name}.png"}
+        data, on_card = raw_ktx2(pixels) if raw else texture_ktx2(pixels, self.ktx2)
+        self._write(f"{name}.ktx2", data)
+        self.bytes["ktx2"] += len(data)
+        self.bytes["memory_ktx2"] += on_card
+        return {"file": f"{name}.png", "ktx2": f"{name}.ktx2", "ktx2_bytes": len(data), "ktx2_memory": on_card}
+
+    def totals(self):
+        """Bytes on disk and on the card; what was not written is left out."""
+        return {key: value for key, value in self.bytes.items() if self.ktx2 is not None or "ktx2" not in key}
+
+    def text(self, name, text):
+        """Write a text file."""
+        self._write(name, text.encode())
+
+    def _write(self, name, data):
+        try:
+            (self.folder / name).write_bytes(data)
+        except OSError as error:
+            raise cannot_write(self.folder, error) from error
+
+
+def cannot_write(folder, error):
+    """The InputError of a folder that takes no more."""
+    folder = folder.parent if folder.name.startswith(HIDDEN) else folder
+    return InputError(f"{folder}: cannot write ({error.strerror}); free space or choose another --out")
+
+
+def choose_ktx2(kind):
+    """The kind ("bc7", "astc", "none") that can be written, or None; and the sentence that says what is missing."""
+    if kind == "none":
+        return None, ""
+    missing = encoder_missing(kind)
+    return (None, missing) if missing else (kind, "")
+
+
+@contextmanager
+def publishing(out):
+    """A hidden folder inside out to write into; in the end its files move to out, facezip.json last.
+
+    A set that lay there before stops being one first: while files of two runs lie side by side there is no index.
+    """
+    out = Path(out)
+    try:
+        for left in out.glob(HIDDEN + "*"):  # of a run that was killed
+            shutil.rmtree(left, ignore_errors=True)
+        workshop = Path(tempfile.mkdtemp(prefix=HIDDEN, dir=out))
+    except OSError as error:
+        raise cannot_write(out, error) from error
+    try:
+        yield workshop
+        stale = _files_of(out)
+        try:
+            (out / INDEX).unlink(missing_ok=True)
+            for path in stale:
+                path.unlink(missing_ok=True)
+            for path in sorted(workshop.iterdir(), key=lambda p: p.name == INDEX):
+                os.replace(path, out / path.name)
+        except OSError as error:
+            raise cannot_write(out, error) from error
+    finally:
+        shutil.rmtree(workshop, ignore_errors=True)
+
+
+def _files_of(folder):
+    """Paths of the images that facezip.json of a folder names, those inside it only."""
+    try:
+        about = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    names = []
+
+    def collect(value):
+        if isinstance(value, dict):
+            names.extend(v for k, v in value.items() if k in ("file", "ktx2") and isinstance(v, str))
+            value = list(value.values())
+        if isinstance(value, list):
+            for each in value:
+                collect(each)
+
+    collect(about)
+    return [folder / name for name in names if Path(name).name == name]
+
+
+def read_packed(folder, which=None):
+    """The Packed that write_packed wrote, of the map called which (default: the first); reads only inside folder."""
+    folder = Path(folder)
+    try:
+        about = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+        if about["format"] != FORMAT:
+            raise InputError(f"{folder}: {INDEX} has format {about['format']!r}, expected {FORMAT!r}")
+        maps = about["maps"]
+        if which is not None and which not in maps:
+            raise InputError(f"{folder}: holds no map {which!r}; there are {', '.join(maps)}")
+        return _read_map(folder, about, maps[which or next(iter(maps))])
+    except (OSError, ValueError, KeyError, TypeError, StopIteration, IndexError) as error:
+        raise InputError(
+            f"{folder}: is no packed set ({error}); give a folder that `facewright compress` wrote"
+        ) from None
+
+
+def _read_map(folder, about, entry):
+    differences = entry["differences"]
+    weights = entry.get("weights", about["weights"])
+    columns, rows = about["weight_size"]
+    across, down = weights["places"]
+    count, k = len(weights["layers"]), len(differences)
+    atlas = np.concatenate([read_texture(_inside(folder, a["file"])) for a in weights["atlas"]], axis=2)
+    cells = atlas.reshape(down, rows, across, columns, -1).transpose(0, 2, 1, 3, 4)
+    return Packed(
+        neutral=read_texture(_inside(folder, entry["neutral"]["file"])),
+        textures=np.stack([read_texture(_inside(folder, d["file"])) for d in differences]),
+        texture_step=np.array([d["step"] for d in differences]),
+        texture_zero=np.array([d["zero"] for d in differences]),
+        weights=np.ascontiguousarray(cells.reshape(-1, rows, columns, atlas.shape[2])[:count, :, :, :k]),
+        weight_step=np.array([layer["step"] for layer in weights["layers"]]),
+        weight_zero=np.array([layer["zero"] for layer in weights["layers"]]),
+        names=tuple(about["expressions"]),
+        layers=np.array(list(about["expressions"].values())),
+        report=entry["report"],
+    )
+
+
+def _inside(folder, name):
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise InputError(f"{folder}: {INDEX} names {name!r}, which lies outside the folder")
+    return path

@@ -1,0 +1,185 @@
+"""Lips that neither pass through each other nor into the teeth, along the whole path of a shape.
+
+Contact is asked twice: a vertex of one lip is in the other if it lies behind the nearest point of that lip and if the
+winding number of the skin says that it is in flesh (the first alone finds false depths of many millimetres on open
+mouths). Both lips then give way half and half, and the skin around follows smoothly: a soft biharmonic field whose
+wishes add up over a few rounds and over all weights at once, so that one delta serves the whole way from 0 to 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.contact.teeth import Teeth
+from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.normals import vertex_normals
+from facewright.mesh.seam import seam_sides
+from facewright.mesh.spread import SoftSpread
+
+_ASIDE_MM = 0.02  # a vertex is asked about this far in front of its own surface, so that this does not count
+_MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
+_PIN = 100.0  # weight of a push against 1 mm2 of bending
+_NOTHING_MM = 1e-4
+_LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
+
+
+@dataclass(frozen=True)
+class LipOptions:
+    """lip_mm   along the skin from the seam, outwards and inwards: what counts as lip
+    near_mm  skin this far from the seam may give way, and says where flesh is
+    smooth_mm width over which a push is felt, round by round: deep contact moves a lip as a whole, the rest is local
+    gap_mm   between lips that have been pushed apart
+    touch_mm contact less deep than this is none
+    teeth_mm how deep in a tooth skin may stay that is there at rest
+    weights  of a shape at which its contact is solved
+    """
+
+    lip_mm: float = 12.0
+    near_mm: float = 20.0
+    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8, 0.8, 0.8)
+    reach_mm: float = 4.0
+    touch_mm: float = 0.12
+    gap_mm: float = 0.05
+    teeth_mm: float = 0.1
+    weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
+
+
+class LipContact:
+    """The lips of one head, asked for contact in any pose of it.
+
+    vertices (n, 3) mm the neutral of the whole head; faces (m, 3) of its skin, the same on both sides (even_handed)
+    seams    upper and lower line, paired, with shared ends
+    outer    (n,) bool: skin that is seen
+    teeth    sequence of slices of the rows of teeth among the vertices, with their faces (from 0): (slice, faces)
+    """
+
+    def __init__(self, vertices, faces, seams, outer, teeth=(), options=None):
+        self.options = options or LipOptions()
+        self.V = vertices
+        seam = np.unique(np.concatenate(seams))
+        near = cKDTree(vertices[seam]).query(vertices)[0] < self.options.near_mm
+        around = faces[near[faces].all(axis=1)]
+        sides = seam_sides(vertices, around, *seams, self.options.lip_mm, split_ends=False)
+        self.used, local = np.unique(around, return_inverse=True)
+        self.faces = np.ascontiguousarray(local.reshape(-1, 3))
+        self.sides = [np.flatnonzero(side[self.used]) for side in sides]
+        self.patches = [self.faces[side[self.used][self.faces].all(axis=1)] for side in sides]
+        self.rims = [border_vertices(patch, len(self.used)) for patch in self.patches]
+        place = np.full(len(vertices), -1)
+        place[self.used] = np.arange(len(self.used))
+        self._pairs = [place[line[1:-1]] for line in seams]
+        self._both = np.concatenate(self.sides)
+        self.lips = self.used[self._both]
+        # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
+        self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
+        rest = np.ascontiguousarray(vertices[self.used])
+        free = ~border_vertices(self.faces, len(rest))
+        self.spread = SoftSpread(rest, self.faces, free, self.options.reach_mm)
+        # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
+        asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
+        self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
+        self.teeth = [(at, Teeth(vertices[at], own)) for at, own in teeth]
+        in_teeth = [np.linalg.norm(row.way_out(rest[self._guarded], vertices[at]), axis=1) for at, row in self.teeth]
+        self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
+
+    def apart(self, motion, weights=None, acts=None, closed=False):
+        """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
+
+        motion   function of a weight: displacement (n, 3) of the head from the neutral
+        acts     function of a weight: how strongly the correction acts there; default: as the weight
+        weights  at which contact is solved; default: options.weights
+        closed   the lips shall meet: pairs of the seam stay together while the rest moves apart, locally
+        """
+        field = np.zeros((len(self.used), 3))
+        hold = np.zeros(len(self.used))
+        poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
+        asked = list(poses)
+        for width in _LOCAL_MM if closed else self.options.smooth_mm:
+            total, most, met = np.zeros_like(field), np.zeros(len(field)), []
+            for weight in asked:
+                share = acts(weight) if acts else weight
+                skin = poses[weight][self.used] + share * field
+                wishes, heeded = self._wishes(skin, poses[weight])
+                if closed:
+                    self._add_closing(skin, wishes, heeded)
+                size = np.linalg.norm(wishes, axis=1) / share
+                more = size > most
+                total[more], most[more] = wishes[more] / share, size[more]
+                hold = np.maximum(hold, heeded)
+                if more.any():
+                    met.append(weight)
+            if met:
+                field = self.spread(field + total, _PIN * hold, width)
+            elif len(asked) == len(poses):
+                break
+            # What was free stays unasked until the rest is free: most of a path never touches.
+            asked = met or list(poses)
+        result = np.zeros_like(self.V)
+        result[self.used] = field
+        result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
+        return result
+
+    def _wishes(self, skin, pose):
+        """Wishes (k, 3) that undo the contact of the skin around the lips (k, 3), teeth in a pose (n, 3) of the head,
+        and (k,) in 0..1 who wishes."""
+        skin = np.ascontiguousarray(skin)
+        wishes, counts = self._lip_wishes(skin)
+        for (at, row), allowed in zip(self.teeth, self._in_teeth):
+            way = row.way_out(skin[self._guarded], pose[at])
+            depth = np.linalg.norm(way, axis=1)
+            hit = depth > allowed + self.options.touch_mm
+            wishes[self._guarded[hit]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            counts[self._guarded[hit]] = 1.0
+        return wishes, np.minimum(counts, 1.0)
+
+    def _add_closing(self, skin, wishes, counts):
+        """Add, in place, what brings pairs of the seam that have come apart back to a small gap, half and half."""
+        a, b = self._pairs
+        way = skin[b] - skin[a]
+        apart = np.linalg.norm(way, axis=1)
+        far = apart > self.options.touch_mm
+        push = 0.5 * way[far] * (1 - self.options.gap_mm / apart[far])[:, None]
+        wishes[a[far]], wishes[b[far]] = push, -push
+        counts[a[far]] = counts[b[far]] = 1.0
+
+    def _lip_wishes(self, skin):
+        """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
+        normals = vertex_normals(skin, self.faces)
+        suspects = [self._suspects(skin, normals, side) for side in (0, 1)]
+        index, corners, share, way = (np.concatenate(both) for both in zip(*suspects))
+        wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
+        if not len(index):
+            return wishes, counts
+        asked = skin[index] + _ASIDE_MM * normals[index]
+        inside = _winding(skin, self.faces, asked) + self._beyond[index] > 0.5
+        index, corners, share, way = (values[inside] for values in (index, corners, share, way))
+        at = np.concatenate([index[:, None], corners], axis=1).ravel()
+        weight = np.concatenate([np.ones((len(index), 1)), share], axis=1).ravel()
+        push = np.repeat(0.5 * way, 4, axis=0) * weight[:, None]
+        push.reshape(-1, 4, 3)[:, 1:] *= -1
+        np.add.at(wishes, at, push)
+        np.add.at(counts, at, weight)
+        return wishes / np.maximum(counts, 1.0)[:, None], counts
+
+    def _suspects(self, skin, normals, side):
+        """Vertices (k,) of a lip that lie behind the other one's surface: with the corners (k, 3) of the triangle they
+        have passed, their shares of it (k, 3) and the way out (k, 3)."""
+        mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
+        found = Surface(skin, patch).closest(skin[mine])
+        corners = patch[found.faces]
+        normal = interpolate(normals, patch, found.faces, found.barycentric)
+        way = found.points - skin[mine]
+        depth = found.distance
+        maybe = ((way * normal).sum(axis=1) > 0) & (depth > self.options.touch_mm) & (depth < _MOST_MM)
+        maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
+        return mine[maybe], corners[maybe], found.barycentric[maybe], (way + self.options.gap_mm * normal)[maybe]
+
+
+def _winding(vertices, faces, points):
+    arrays = (np.ascontiguousarray(a) for a in (vertices, faces, points))
+    return np.asarray(igl.fast_winding_number(*arrays)).reshape(-1)

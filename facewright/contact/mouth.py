@@ -1,0 +1,237 @@
+"""The shapes of jaw and mouth, made sound on each head: the jaw's arc, mouthClose, lips and teeth that do not cross."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from facewright.contact.jaw import find_jaw
+from facewright.contact.lips import LipContact, LipOptions
+from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
+from facewright.conventions import corrective_name, in_between_name, mirrored_name
+from facewright.solve.procrustes import best_rotation
+from facewright.transfer.shapes import even_cut
+
+HALF = 0.5
+_MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
+_EVEN_MM = 1e-6
+PAIRS = (
+    ("mouthSmile", "jawOpen"),
+    ("mouthSmile", "mouthFunnel"),
+    ("mouthFunnel", "mouthPucker"),
+    ("mouthFrown", "mouthPress"),
+    ("mouthRollUpper", "mouthRollLower"),
+    ("mouthShrugUpper", "mouthShrugLower"),
+)
+
+
+@dataclass(frozen=True)
+class MouthOptions:
+    """lips, close  how lips meet, how mouthClose is made
+    window_mm    width over the midline over which left hands over to right
+    halves       shapes that get an in-between at half
+    pairs        shapes, or both sides of them, that get a corrective together
+    """
+
+    lips: LipOptions = field(default_factory=LipOptions)
+    close: MouthCloseOptions = field(default_factory=MouthCloseOptions)
+    window_mm: float = 44.0
+    halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
+    pairs: tuple[tuple[str, str], ...] = PAIRS
+
+
+def part_lips(face, options=None):
+    """The Face with a neutral whose lips neither cross nor stand in the teeth (its parts are in place)."""
+    contact = _Mouth(face, options or MouthOptions()).contact
+    still = np.zeros_like(face.vertices)
+    return replace(face, vertices=face.vertices + contact.apart(lambda weight: still, (1.0,), closed=True))
+
+
+def solve_mouth(face, targets, options=None, jobs=1):
+    """Targets with the shapes of the mouth as this head needs them.
+
+    face  data.Face with its parts in place and its lips parted (part_lips); targets from transfer and solve_eyes
+    jobs  threads; the result does not depend on them
+    """
+    mouth = _Mouth(face, options or MouthOptions(), jobs)
+    result = mouth.with_arc(targets)
+    result = mouth.with_single_shapes(result)
+    result = mouth.with_both_sides(result)
+    result = mouth.with_halves(result)
+    result = mouth.with_mouth_close(result)
+    result = mouth.with_pairs(result)
+    return result.evened(face.template.mirror) if _is_even(face) else result
+
+
+def _is_even(face):
+    """Whether the head is its own mirror image: then what rests on its middle line has no nearer side."""
+    mirrored = face.vertices[face.template.mirror] * [-1.0, 1.0, 1.0]
+    return bool(np.abs(mirrored - face.vertices).max() < _EVEN_MM)
+
+
+class _Mouth:
+    """The mouth of one face: lips, teeth, jaw, and a window that tells left from right."""
+
+    def __init__(self, face, options, jobs=1):
+        self.face, self.options, self.jobs = face, options, jobs
+        template = face.template
+        self.skin = template.skin.vertex_slice
+        self.faces = even_cut(template.faces[template.skin.face_slice], template.mirror, template.vertices[:, 0])
+        self.seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
+        rows = [part for part in template.parts if part.name.startswith("teeth")]
+        teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]
+        self.contact = LipContact(face.vertices, self.faces, self.seams, face.regions["outer"], teeth, options.lips)
+        skull = face.regions["skull"]
+        still = skull if skull.any() else face.regions["outer"]
+        self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
+        share = np.clip(0.5 + template.vertices[:, 0] / options.window_mm, 0.0, 1.0)
+        self.left = (share * share * (3 - 2 * share))[:, None]
+
+    def with_arc(self, targets):
+        """Targets whose jawOpen passes the arc at half; unchanged where the template has no jaw."""
+        if "jawOpen" not in targets.names:
+            return targets
+        opened = targets.delta("jawOpen")
+        jaw = find_jaw(self.face, opened)
+        if jaw is None:
+            return targets
+        half = in_between_name("jawOpen", HALF)
+        extras = targets.extras | {half: jaw.half_open(self.face.vertices, opened, HALF)}
+        return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
+
+    def with_single_shapes(self, targets):
+        """Targets of which each by itself keeps the lips apart on its whole way."""
+        names = self._lip_shapes(targets)
+        lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
+        for name, lack in zip(names, lacks):
+            targets = _added(targets, lack, {name: 1.0})
+        return targets
+
+    def with_both_sides(self, targets):
+        """Targets of which left and right together keep the lips apart too; each side gets its share."""
+        for name in self._lip_shapes(targets):
+            twin = mirrored_name(name)
+            if name.startswith("mouth") and name.endswith("Left") and name != twin and twin in targets.names:
+                shares = {name: self.left, twin: 1.0 - self.left}
+                targets = self._corrected(targets, {name: 1.0, twin: 1.0}, shares)
+        return targets
+
+    def with_mouth_close(self, targets):
+        """Targets whose mouthClose closes the lips of a jaw that opens by the same weight."""
+        if not {"mouthClose", "jawOpen"} <= set(targets.names):
+            return targets
+        jaw = find_jaw(self.face, targets.delta("jawOpen"))
+        if jaw is None:
+            return targets
+        opens = {1.0: targets.delta("jawOpen")[self.skin]}
+        for weight, target in targets.in_betweens.get("jawOpen", {}).items():
+            opens[weight] = targets.delta(target)[self.skin]
+        skin = self.face.vertices[self.skin]
+        closed = dict(
+            zip(opens, mouth_close(skin, self.faces, self.seams, jaw, opens, self.forward, self.options.close))
+        )
+        deltas = np.array(targets.deltas)
+        k = targets.names.index("mouthClose")
+        deltas[k] = 0.0
+        deltas[k, self.skin] = closed.pop(1.0)
+        extras, steps = dict(targets.extras), {}
+        for weight, delta in closed.items():
+            steps[weight] = in_between_name("mouthClose", weight)
+            extras[steps[weight]] = np.zeros_like(deltas[k])
+            extras[steps[weight]][self.skin] = delta
+        in_betweens = targets.in_betweens | ({"mouthClose": steps} if steps else {})
+        made = replace(targets, deltas=deltas, extras=extras, in_betweens=in_betweens)
+        return self._corrected(made, {"jawOpen": 1.0, "mouthClose": 1.0}, {"mouthClose": 1.0}, closed=True)
+
+    def with_pairs(self, targets):
+        """Targets with a corrective for each pair of options.pairs that the template has."""
+        extras, correctives = dict(targets.extras), dict(targets.correctives)
+        pairs = [[_sides(name, targets.names) for name in pair] for pair in self.options.pairs]
+        pairs = [sides for sides in pairs if all(sides)]
+        lacks = self._each(
+            lambda sides: self._lack(targets, _together(sides), weights=(1.0, HALF), acts=_square), pairs
+        )
+        for sides, lack in zip(pairs, lacks):
+            for drivers, share in self._shared(sides):
+                name = corrective_name(drivers)
+                extras[name], correctives[name] = share * lack, drivers
+        return replace(targets, extras=extras, correctives=correctives)
+
+    def with_halves(self, targets):
+        """Targets with an in-between for shapes whose way no straight line follows: it passes round the teeth."""
+        names = [name for name in self.options.halves if name in targets.names]
+        for name in names:
+            targets = self._corrected(targets, {name: 1.0}, {name: 1.0}, weights=(1.0,))
+        path = {"weights": (HALF, 0.5 * HALF, 1.5 * HALF), "acts": _hat}
+        lacks = self._each(lambda name: self._lack(targets, {name: 1.0}, **path), names)
+        extras, in_betweens = dict(targets.extras), dict(targets.in_betweens)
+        for name, lack in zip(names, lacks):
+            half = in_between_name(name, HALF)
+            extras[half] = HALF * targets.delta(name) + lack
+            in_betweens[name] = {HALF: half}
+        return replace(targets, extras=extras, in_betweens=in_betweens)
+
+    def _each(self, work, items):
+        """Results of work on independent items, in order, by as many threads as there are jobs."""
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(work, items))
+
+    def _shared(self, sides):
+        """(drivers, share (n, 1) or 1) of the correctives of a pair; each shape is given by one name or two sides."""
+        one, other = sides
+        if len(one) == len(other) == 1:
+            return [((one[0], other[0]), 1.0)]
+        lefts, rights = zip(*((side[0], side[-1]) for side in sides))
+        return [(lefts, self.left), (rights, 1.0 - self.left)]
+
+    def _lip_shapes(self, targets):
+        """Names of the shapes that move lips; mouthClose, which comes with jawOpen, apart."""
+        motion = np.abs(targets.deltas[:, self.contact.lips]).max(axis=(1, 2))
+        return [name for name, most in zip(targets.names, motion) if most > _MOVES_MM and name != "mouthClose"]
+
+    def _lack(self, targets, pose, **how):
+        """(n, 3) what a pose lacks along its way; how: as LipContact.apart takes it."""
+        return self.contact.apart(lambda weight: targets.motion(_scaled(pose, weight)), **how)
+
+    def _corrected(self, targets, pose, shares, **how):
+        """Targets after the contact of a pose has been solved along its way; shares: name -> its part of the result."""
+        return _added(targets, self._lack(targets, pose, **how), shares)
+
+
+def _added(targets, field, shares):
+    """Targets with shares of a field (n, 3) added to shapes and to what they pass: shares name -> factor."""
+    if not field.any():
+        return targets
+    deltas, extras = np.array(targets.deltas), dict(targets.extras)
+    for name, share in shares.items():
+        deltas[targets.names.index(name)] += share * field
+        for weight, target in targets.in_betweens.get(name, {}).items():
+            extras[target] = extras[target] + weight * share * field
+    return replace(targets, deltas=deltas, extras=extras)
+
+
+def _together(sides):
+    return {name: 1.0 for side in sides for name in side}
+
+
+def _square(weight):
+    return weight * weight
+
+
+def _hat(weight):
+    """How strongly an in-between at half acts."""
+    return 1.0 - abs(2.0 * weight - 1.0)
+
+
+def _scaled(weights, by):
+    return {name: weight * by for name, weight in weights.items()}
+
+
+def _sides(name, names):
+    """A shape of the template by its name, or the names of its left and right; () if it has neither."""
+    if name in names:
+        return (name,)
+    both = (f"{name}Left", f"{name}Right")
+    return both if set(both) <= set(names) else ()

@@ -1,0 +1,72 @@
+"""Teeth as solids that skin must not enter."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from facewright.mesh.closest import Surface
+from facewright.mesh.normals import face_normals, vertex_normals
+
+_BEHIND_MM = 0.2
+_MOST_MM = 8.0  # skin this deep in a tooth has come from elsewhere
+_FACING = 0.2  # cosine with the way out of the arch, above which a face belongs to its outer side
+
+
+class Teeth:
+    """One row of teeth of a head: vertices (k, 3) mm at rest, faces (m, 3) of it.
+
+    A pose of it is an affine image of the row at rest (a jaw that turns, or a chord of that turn), so points are
+    brought back to rest and asked there. Lips and cheeks come from outside the arch and leave on that side, however
+    near the inner side may be.
+    """
+
+    def __init__(self, vertices, faces):
+        self.vertices, self.faces = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
+        self._low, self._high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        outer = self.faces[_outer_side(self.vertices, self.faces)]
+        self._outside, self._normals = Surface(self.vertices, outer), face_normals(self.vertices, outer)
+        self._tree = igl.FastWindingNumberBVH()
+        self._tree.init(self.vertices, self.faces)
+        self._to_affine = np.linalg.pinv(np.column_stack([self.vertices, np.ones(len(vertices))]))
+        self.solid = self._is_solid()
+
+    def way_out(self, points, moved):
+        """(k, 3) ways out of the teeth for points (k, 3), zero outside; moved (v, 3): the row in its pose."""
+        result = np.zeros_like(points)
+        if not self.solid:
+            return result
+        affine = self._to_affine @ moved
+        A, t = affine[:3].T, affine[3]
+        back = np.linalg.solve(A, (points - t).T).T
+        near = np.flatnonzero(((back > self._low) & (back < self._high)).all(axis=1))
+        if not len(near):
+            return result
+        # Most points lie before the outer side: only the rest need the dear question.
+        found = self._outside.closest(back[near])
+        way = found.points - back[near]
+        maybe = ((way * self._normals[found.faces]).sum(axis=1) > 0) & (found.distance < _MOST_MM)
+        inside = np.flatnonzero(maybe)
+        inside = inside[self._winding(back[near[inside]]) > 0.5]
+        result[near[inside]] = way[inside] @ A.T
+        return result
+
+    def _winding(self, points):
+        if not len(points):
+            return np.zeros(0)
+        return np.asarray(self._tree.winding_number(np.ascontiguousarray(points))).reshape(-1)
+
+    def _is_solid(self):
+        """Whether the faces enclose something: what lies just behind most of them is inside. Strips are all front."""
+        behind = self.vertices - _BEHIND_MM * vertex_normals(self.vertices, self.faces)
+        return bool(np.median(self._winding(behind)) > 0.8)
+
+
+def _outer_side(vertices, faces):
+    """(m,) bool: faces of an arch that look away from its middle; the arch lies flat along its two longer axes."""
+    middle = vertices.mean(axis=0)
+    up = np.linalg.svd(vertices - middle, full_matrices=False)[2][2]
+    away = vertices[faces].mean(axis=1) - middle
+    away -= (away @ up)[:, None] * up
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    return (face_normals(vertices, faces) * away).sum(axis=1) > _FACING

@@ -1,0 +1,105 @@
+"""Close-ups of eyes and mouth for every shape and for the pairs, half way and whole: where rigs fail first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from facewright.evaluate.play import Player, both_sides
+from facewright.evaluate.shapes import shape_names, with_base
+from facewright.mesh.raster import Camera
+from facewright.mesh.scene import Scene
+from facewright.write.sheet import Cell, Section
+
+WEIGHTS = (0.5, 1.0)
+SIZE = (152, 292)  # (height, width) in pixels
+COLUMNS = 6
+EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
+MOUTH_PAIRS = (
+    ("mouthSmile", "jawOpen"),
+    ("mouthSmile", "mouthFunnel"),
+    ("mouthFunnel", "mouthPucker"),
+    ("mouthFrown", "mouthPress"),
+    ("mouthRollUpper", "mouthRollLower"),
+    ("mouthShrugUpper", "mouthShrugLower"),
+)
+_UPPER, _MIDDLE = ("eye", "brow"), ("cheekSquint", "noseSneer")  # what is looked at; the rest is the mouth's
+_AROUND_MM = 30.0  # beyond the picture's edge: what may come into it
+
+
+def close_up_poses(rig):
+    """Three dicts label -> weights, for the eyes, the middle of the face and the mouth: every shape of a rig, both
+    sides of one together, and the pairs."""
+    names = shape_names(rig)
+    one_name = dict.fromkeys(_without_side(name, names) for name in names)
+    poses = {name: with_base(name, names) for name in one_name}
+    poses |= {" + ".join(pair): dict.fromkeys(pair, 1.0) for pair in (*EYE_PAIRS, *MOUTH_PAIRS)}
+    poses = {label: both_sides(weights, names) for label, weights in poses.items()}
+    sorted_out = {}, {}, {}
+    for label, weights in poses.items():
+        if weights is not None:
+            where = 0 if label.startswith(_UPPER) else 1 if label.startswith(_MIDDLE) else 2
+            sorted_out[where][label] = weights
+    return sorted_out
+
+
+def close_up_sections(rig, drawables, picture, run):
+    """Sections of a contact sheet; played with in-betweens and correctives where the rig has them.
+
+    drawables  function (Rig) -> list of scene.Drawable; picture  function (Scene, Camera) -> (h, w, 3)
+    run        a map, that of a thread pool or the builtin one
+    """
+    play = Player(rig, full=True)
+    titles = ("Eyes and brows", "Cheeks and nose", "Mouth and jaw")
+    sections = []
+    for title, camera, poses in zip(titles, close_up_cameras(rig), close_up_poses(rig)):
+        jobs = [(label, weights, share) for label, weights in poses.items() for share in WEIGHTS]
+
+        def cell(job, camera=camera):
+            label, weights, share = job
+            posed = posed_rig(rig, play, {name: share * weight for name, weight in weights.items()}, camera)
+            return Cell(picture(Scene(drawables(posed)), camera), label if share == 1.0 else f"{label}, {share:g}")
+
+        cells = list(run(cell, jobs))
+        rows = tuple(tuple(cells[i : i + COLUMNS]) for i in range(0, len(cells), COLUMNS))
+        if rows:
+            sections.append(Section(f"{title}, half way and whole", rows, "both sides together; pairs last"))
+    return sections
+
+
+def _without_side(name, names):
+    """mouthSmileLeft and mouthSmileRight -> mouthSmile, where the rig has both; jawLeft stays."""
+    for side, other in (("Left", "Right"), ("Right", "Left")):
+        stem = name.removesuffix(side)
+        if stem != name and stem + other in names and stem not in ("jaw", "mouth"):
+            return stem
+    return name
+
+
+def close_up_cameras(rig):
+    """Cameras on the eyes with the brows, on the middle of the face, and on the mouth with the chin."""
+    vertices = rig.meshes[0].vertices
+    middles = []
+    for prefix, otherwise in (("lid_", (0.0, 2.0, 0.0)), ("lip_", (0.0, -65.0, 0.0))):
+        lines = [line for name, line in rig.lines.items() if name.startswith(prefix)]
+        middles.append(vertices[np.concatenate(lines)].mean(axis=0) if lines else np.array(otherwise))
+    eyes, mouth = middles
+    frames = ((eyes + [0.0, 8.0, 0.0], 27.0), (0.5 * (eyes + mouth), 46.0), (mouth + [0.0, -9.0, 0.0], 36.0))
+    return [Camera.looking_at(center, 0.0, 0.0, half_height, SIZE) for center, half_height in frames]
+
+
+def posed_rig(rig, play, weights, camera):
+    """The Rig in a pose, without targets; only the faces that can come into the picture."""
+    half = camera.half_height * np.array([camera.size[1] / camera.size[0], 1.0]) + _AROUND_MM
+    meshes = []
+    for mesh in rig.meshes:
+        vertices = play(mesh, weights)
+        inside = (np.abs(vertices - camera.center)[:, :2] < half).all(axis=1)
+        kept = inside[mesh.faces].any(axis=1)
+        if kept.any():
+            faces, uv_faces = mesh.faces[kept], mesh.uv_faces[kept]
+            meshes.append(replace(mesh, vertices=vertices, faces=faces, uv_faces=uv_faces, deltas=None))
+        elif mesh is rig.meshes[0]:
+            meshes.append(replace(mesh, vertices=vertices, deltas=None))
+    return replace(rig, meshes=tuple(meshes))

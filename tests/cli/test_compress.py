@@ -1,0 +1,211 @@
+"""The command line of FaceZip from images to a packed set and back, and what it says about bad input."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from facewright.cli.__main__ import main
+from facewright.cli.compress import parse_size
+from facewright.compress.folder import read_packed
+from facewright.compress.synthetic import expression_set
+
+QUAD = "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
+NAMES = ("smile", "frown", "jaw", "blink", "sneer", "puff")
+
+
+@pytest.fixture
+def command(tmp_path):
+    made = expression_set((48, 56), len(NAMES))
+    grey = [image[:, :, 0].astype(np.uint16) * 100 for image in [made.neutral, *made.textures]]
+    (tmp_path / "textures").mkdir()
+    (tmp_path / "height").mkdir()
+    Image.fromarray(made.neutral).save(tmp_path / "neutral.png")
+    Image.fromarray(grey[0]).save(tmp_path / "height.png")
+    for name, texture, deep in zip(NAMES, made.textures, grey[1:]):
+        Image.fromarray(texture).save(tmp_path / "textures" / f"{name}.png")
+        Image.fromarray(deep).save(tmp_path / "height" / f"{name}.png")
+    (tmp_path / "mesh.obj").write_text(QUAD)
+    return [
+        "compress",
+        f"{tmp_path}/textures",
+        "--neutral",
+        f"{tmp_path}/neutral.png",
+        "--mesh",
+        f"{tmp_path}/mesh.obj",
+    ]
+
+
+def run(command, tmp_path, *more):
+    return main([*command, "--out", f"{tmp_path}/packed", "--quiet", *more])
+
+
+def test_compress_and_decompress(tmp_path, command, capsys):
+    assert run(command, tmp_path, "--textures", "6") == 0
+    assert "preview.html is left out" in capsys.readouterr().out  # six textures are more than the shader reads
+    frame = tmp_path / "frame.png"
+    assert main(["decompress", f"{tmp_path}/packed", "--weights", "smile=1", "--out", str(frame)]) == 0
+    smile = np.array(Image.open(tmp_path / "textures" / "smile.png")).astype(int)
+    assert np.abs(np.array(Image.open(frame)).astype(int) - smile).max() <= 1
+
+
+def test_the_folder_holds_what_the_index_names_and_a_page_without_links(tmp_path, command):
+    assert run(command, tmp_path) == 0
+    about = json.loads((tmp_path / "packed" / "facezip.json").read_text())
+    images = [about["maps"]["color"]["neutral"], *about["maps"]["color"]["differences"], *about["weights"]["atlas"]]
+    files = {path.name for path in (tmp_path / "packed").iterdir()}
+    named = {image[key] for image in images for key in ("file", "ktx2") if key in image}
+    assert files == named | {"facezip.json", "facezip.glsl", "facezip.hlsl", "preview.html"}
+    page = (tmp_path / "packed" / "preview.html").read_text()
+    assert "http" not in page.replace("http-equiv", "") and " src=" not in page and "facezipWeights" in page
+
+
+def test_every_option_together(tmp_path, command, capsys):
+    region = np.zeros((48, 56), np.uint8)
+    region[:, 28:] = 255
+    Image.fromarray(region).save(tmp_path / "half.png")
+    B = np.random.default_rng(0).random((len(NAMES), 8))
+    rows = [",".join(["texture", *(f"s{m}" for m in range(8))])]
+    rows += [",".join([name, *map(str, weights)]) for name, weights in zip(NAMES, B)]
+    (tmp_path / "examples.csv").write_text("\n".join(rows))
+    more = ["--keep", "jaw", "--priority", f"{tmp_path}/half.png", "--examples", f"{tmp_path}/examples.csv", "--align"]
+    more += ["--also", "height", f"{tmp_path}/height", f"{tmp_path}/height.png", "--budget", "1MB", "--ktx2", "none"]
+    assert run(command, tmp_path, *more) == 0
+    told = capsys.readouterr().out
+    assert "8 shapes, weights within" in told and "with shared weights" in told
+    packed = read_packed(tmp_path / "packed", "height")
+    assert packed.names == tuple(f"s{m}" for m in range(8)) and packed.neutral.dtype == np.uint16
+    assert not list((tmp_path / "packed").glob("*.ktx2"))
+    assert run(command, tmp_path, "--method", "paper", "--masks", "6", "--region", f"{tmp_path}/half.png") == 0
+
+
+def test_a_budget_sets_the_number_of_difference_textures(tmp_path, command, capsys):
+    assert run(command, tmp_path, "--budget", f"{3 * 48 * 56 * 3 + 6 * 4 * 6 * 7}") == 0
+    assert len(read_packed(tmp_path / "packed").textures) == 2
+    assert run(command, tmp_path, "--budget", "5KB") == 2
+    assert "too small" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text,size", [("8MB", 8_000_000), ("1.5 KiB", 1536), ("1e6", 1_000_000)])
+def test_sizes(text, size):
+    assert parse_size(text) == size
+
+
+def test_evaluate_compression(tmp_path, command, capsys):
+    out = tmp_path / "figures"
+    assert main(["evaluate", "compression", *command[1:], "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert all(word in told for word in ("PCA(8)", "published", "refined", "random restarts"))
+    tables = {"table.csv", "expressions.csv", "masks.csv", "restarts.csv", "figures.json"}
+    plots = {"errors.png", "permutation.png", "masks.png", "worst.png", "median.png"}
+    assert {path.name for path in out.iterdir()} == tables | plots
+    assert main(["evaluate", "compression", command[1]]) == 2
+    assert "give --neutral IMAGE and --mesh OBJ" in capsys.readouterr().err
+
+
+def broken_texture(folder):
+    (folder / "textures" / "broken.png").write_bytes(b"\x89PNG")
+
+
+def truncated_texture(folder):
+    path = folder / "textures" / "jaw.png"
+    path.write_bytes(path.read_bytes()[:1500])
+
+
+def other_size(folder):
+    Image.new("RGB", (20, 20)).save(folder / "textures" / "small.png")
+
+
+def uv_outside(folder):
+    (folder / "mesh.obj").write_text(QUAD.replace("vt 1 1", "vt 1.5 1"))
+
+
+def no_uv(folder):
+    (folder / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+
+def no_textures(folder):
+    for path in (folder / "textures").iterdir():
+        path.unlink()
+
+
+@pytest.mark.parametrize(
+    "spoil,words",
+    [
+        (broken_texture, "broken.png"),
+        (truncated_texture, "jaw.png"),
+        (other_size, "export all textures alike"),
+        (uv_outside, "beyond the image"),
+        (no_uv, "without UVs"),
+        (no_textures, "holds no images"),
+    ],
+)
+def test_bad_input_ends_in_exit_code_2_and_leaves_nothing(tmp_path, command, capsys, spoil, words):
+    spoil(tmp_path)
+    assert run(command, tmp_path) == 2
+    told = capsys.readouterr().err
+    assert words in told and len(told.strip().splitlines()) == 1
+    assert not (tmp_path / "packed").exists()
+
+
+@pytest.mark.parametrize(
+    "more,words",
+    [
+        (["--method", "paper", "--textures", "5", "--keep", "jaw"], "--keep works with"),
+        (["--keep", "grin"], "no such texture"),
+        (["--budget", "lots"], "is no size"),
+        (["--masks", "0"], "at least 1"),
+        (["--textures", "9"], "1 to 8"),
+        (["--also", "color", "x", "y"], "a name of its own"),
+    ],
+)
+def test_bad_options_are_one_sentence(tmp_path, command, capsys, more, words):
+    assert run(command, tmp_path, *more) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_fewer_textures_than_clusters(tmp_path, command, capsys):
+    for name in NAMES[3:]:
+        (tmp_path / "textures" / f"{name}.png").unlink()
+    assert run(command, tmp_path, "--method", "paper") == 2
+    assert "cannot form 4 clusters" in capsys.readouterr().err
+    assert run(command, tmp_path) == 0
+
+
+def test_a_full_disk_leaves_nothing(tmp_path, command, capsys, monkeypatch):
+    real = Path.write_bytes
+
+    def write_bytes(self, data):
+        if len(data):
+            raise OSError(28, "No space left on device")
+        return real(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+    assert run(command, tmp_path) == 2
+    assert "No space left on device" in capsys.readouterr().err
+    assert not (tmp_path / "packed").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_a_killed_run_leaves_no_index_and_the_next_one_cleans_up(tmp_path, command):
+    out = tmp_path / "packed"
+    code = "import sys, time\nfrom facewright.compress import folder\nreal = folder._Store.text\n"
+    code += "folder._Store.text = lambda self, *a: (real(self, *a), print('written', flush=True), time.sleep(60))\n"
+    code += "from facewright.cli.__main__ import main\nmain(sys.argv[1:])\n"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *command, "--out", str(out), "--quiet"], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline().strip() == "written"
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not [path for path in out.iterdir() if not path.name.startswith(".facezip-")]
+    time.sleep(0.1)
+    assert run(command, tmp_path) == 0
+    assert not list(out.glob(".facezip-*")) and (out / "facezip.json").exists()

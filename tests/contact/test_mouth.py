@@ -1,0 +1,108 @@
+"""Lips keep off each other on the way of every shape, mouthClose closes, the jaw turns on an arc."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from facewright.contact import Targets, find_jaw, part_lips, solve_mouth
+from facewright.contact.mouth import MouthOptions
+from facewright.evaluate.mouth import measure_mouth
+from facewright.evaluate.quality import lip_gaps_mm
+from facewright.parts import build_rig, fit_parts
+from facewright.transfer import transfer_shapes
+
+KEPT = ("jawOpen", "mouthClose", "mouthPucker", "mouthFunnel", "mouthPressLeft", "mouthPressRight", "mouthShrugLower")
+PAIRS = (("mouthFunnel", "mouthPucker"), ("mouthPress", "jawOpen"))
+
+
+def only(face, deltas):
+    """Targets with a few shapes of the mouth: the others cost time and show nothing new."""
+    names = face.template.shape_names
+    return Targets(KEPT, np.array([deltas[names.index(name)] for name in KEPT]))
+
+
+def rig_of(face, targets):
+    template = replace(face.template, shape_names=targets.names, deltas=targets.deltas)
+    return build_rig(replace(face, template=template), targets.deltas, eyes=targets)
+
+
+@pytest.fixture(scope="module")
+def solved(hm08_person):
+    """A person, the raw Targets and the solved ones."""
+    person = part_lips(fit_parts(hm08_person(4)))
+    raw = only(person, transfer_shapes(person))
+    return person, raw, solve_mouth(person, raw, MouthOptions(pairs=PAIRS))
+
+
+@pytest.fixture(scope="module")
+def figures(solved):
+    """Figures of crossing before and after: pose -> (full, plain)."""
+    person, raw, targets = solved
+    poses = {f"{name} {w}": {name: w} for name in KEPT if name != "mouthClose" for w in (0.25, 0.5, 0.75, 1.0)}
+    poses |= {"both": {"mouthPressLeft": 1.0, "mouthPressRight": 1.0}}
+    poses |= {"pair": {"mouthFunnel": 1.0, "mouthPucker": 1.0}}
+    return [measure_mouth(rig_of(person, found), poses) for found in (raw, targets)]
+
+
+def test_no_lip_enters_the_other(figures):
+    before, after = ([f["crossing_mm"] for f in found["poses"].values()] for found in figures)
+    assert max(full for full, _ in before) > 0.5
+    assert max(full for full, _ in after) < 0.3
+
+
+def test_single_shapes_need_no_corrective(figures):
+    for pose, found in figures[1]["poses"].items():
+        assert pose == "pair" or found["crossing_mm"][1] < 0.3, pose
+
+
+def test_mouth_close_closes_the_open_jaw(solved, figures):
+    person, _, targets = solved
+    assert max(figures[1]["mouth_close_gap_mm"]) < 0.3
+    skin = person.template.skin.vertex_slice
+    half = person.vertices + targets.motion({"jawOpen": 0.5, "mouthClose": 0.5})
+    assert lip_gaps_mm(half[skin], person.lines).max() < 0.3
+
+
+def test_the_jaw_takes_an_arc(solved):
+    person, _, targets = solved
+    jaw = find_jaw(person, targets.delta("jawOpen"))
+    teeth = person.template.part("teeth_lower").vertex_slice
+    rest = person.vertices[teeth]
+    for weight in (0.5, 1.0):
+        pose = rest + targets.motion({"jawOpen": weight})[teeth]
+        assert np.abs(pose - jaw.moved(rest, weight)).max() < 0.02
+    assert 15 < np.degrees(np.linalg.norm(jaw.turn)) < 35
+    assert abs(jaw.hinge @ [1, 0, 0]) < 3
+
+
+def test_the_bone_sits_at_the_hinge(solved):
+    person, _, targets = solved
+    jaw = find_jaw(person, targets.delta("jawOpen"))
+    rig = jaw.on_rig(rig_of(person, targets))
+    assert np.allclose(rig.skeleton.positions[rig.skeleton.names.index("jaw")], jaw.hinge)
+    assert np.allclose(np.radians(rig.info["jaw_open_turn_deg"]), jaw.turn)
+
+
+def test_what_is_far_from_the_lips_is_left_alone(solved):
+    person, raw, targets = solved
+    changed = np.abs(targets.delta("mouthPucker") - raw.delta("mouthPucker")).max(axis=1) > 0
+    seam = person.vertices[person.lines["lip_seam_upper"]]
+    distance = np.linalg.norm(person.vertices[changed][:, None] - seam[None], axis=2).min(axis=1)
+    assert changed.any() and distance.max() < 25
+    other = person.template.skin.vertices[1]
+    assert not changed[other:].any()
+
+
+def test_left_is_the_mirror_of_right(hm08, hm08_person):
+    face = part_lips(replace(hm08_person(0), vertices=hm08.vertices))
+    targets = solve_mouth(face, only(face, hm08.deltas), MouthOptions(pairs=PAIRS[1:]))
+    pairs = [("mouthPressLeft", "mouthPressRight"), ("mouthPressLeft+jawOpen", "mouthPressRight+jawOpen")]
+    for left, right in [*pairs, ("mouthPucker", "mouthPucker"), ("jawOpen@0.5", "jawOpen@0.5")]:
+        mirrored = targets.delta(right)[hm08.mirror] * [-1, 1, 1]
+        assert np.abs(targets.delta(left) - mirrored).max() < 0.01, left
+
+
+def test_rest_without_faults_stays(hm08, hm08_person):
+    face = replace(hm08_person(0), vertices=hm08.vertices)
+    assert np.abs(part_lips(face).vertices - hm08.vertices).max() < 0.05
