@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.evaluate.eyes import eye_poses
-from facewright.expand import expand_weights
+from facewright.evaluate.play import Player
+from facewright.evaluate.rows import Row
+from facewright.evaluate.shapes import shape_names
 from facewright.mesh.closest import Surface, interpolate
 
 ROOT_MM = 0.05  # a vertex of a lash this near to the skin at rest is a root
@@ -21,22 +23,26 @@ def measure_lashes(rig):
     found = [lashes for lashes in found if len(lashes.roots)]
     if not found:
         return None
-    poses = {f"{name} {step:g}": {name: step} for name in _singles(rig) for step in STEPS}
+    poses = {f"{name} {step:g}": {name: step} for name in shape_names(rig) for step in STEPS}
     for name, weights in eye_poses().items():
         sided = {f"{shape}{side}": weight for shape, weight in weights.items() for side in ("Left", "Right")}
         if set(sided) <= set(rig.target_names):
             poses[name] = sided
-    worst, at = 0.0, ""
+    play, worst, at = Player(rig, full=True), 0.0, ""
     for name, weights in poses.items():
-        expanded = expand_weights(weights, rig.in_betweens, rig.correctives)
+        expanded = play.targets(weights)
         off = max(lashes.off_mm(expanded) for lashes in found)
         if off > worst:
             worst, at = off, name
     return {"roots": sum(len(lashes.roots) for lashes in found), "off_mm": worst, "at": at}
 
 
-def _singles(rig):
-    return [name for name in rig.target_names if not set(name) & set("@+")]
+def lash_rows(rig):
+    """The row of rows.Row that `facewright evaluate rig` prints; none without lashes."""
+    found = measure_lashes(rig)
+    if found is None:
+        return []
+    return [Row("lashes", found["at"], "off the margin mm", found["off_mm"], bar=(None, LASH_BAR_MM))]
 
 
 class _Lashes:
