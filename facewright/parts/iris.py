@@ -64,7 +64,7 @@ def _sclera(angle, around, look):
     veins = _veins(angle[shown].astype(np.float32), around[shown].astype(np.float32))
     # They show at the sides, where lids do not cover the white.
     veins = veins * (0.35 + 0.65 * np.cos(around[shown]) ** 2)
-    color[shown] *= 1 - veins[:, None] * [0.18, 0.55, 0.55]
+    color[shown] *= 1 - veins[:, None] * [0.10, 0.34, 0.34]
     return color
 
 
@@ -82,7 +82,7 @@ def _veins(angle, around):
         a = angle[sector]
         wander = 0.05 * np.sin(0.16 * a + waves[0]) + 0.025 * np.sin(0.45 * a + waves[1])
         fork = 0.012 * np.maximum(a - fork_at, 0)
-        strength, width = most * _step(a, first, first + 24), 0.006 + 0.006 * _step(a, 45, 80)
+        strength, width = most * _step(a, first, first + 24), 0.004 + 0.005 * _step(a, 45, 80)
         for branch in (-0.5, 0.5):
             off = around[sector] - np.float32(start) - wander - branch * fork
             veins[sector] = np.maximum(veins[sector], strength * np.exp(-((off / width) ** 2)))
