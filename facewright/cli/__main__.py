@@ -24,12 +24,12 @@ class Parser(argparse.ArgumentParser):
 
 def build_parser():
     """The parser of all commands; a command's module is imported only for its own arguments and run."""
-    from facewright.cli import compress, decompress, demo, evaluate, rig, template
+    from facewright.cli import compress, decompress, demo, evaluate, landmarks, rig, template
 
     parser = Parser(prog="facewright", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--version", action="version", version=f"facewright {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    modules = {"rig": rig, "demo": demo, "template": template, "evaluate": evaluate}
+    modules = {"rig": rig, "demo": demo, "landmarks": landmarks, "template": template, "evaluate": evaluate}
     modules |= {"compress": compress, "decompress": decompress}
     for name, module in modules.items():
         command = commands.add_parser(

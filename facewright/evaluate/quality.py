@@ -16,7 +16,7 @@ SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
 RIM_MM, LIP_RIM_MM = 2.0, 1.0
 FINE = 5  # rays along the side of a pixel that is looked at closely
-CANTHI = ("mp133", "mp33", "mp362", "mp263")
+CANTHI, CORNERS = ("mp133", "mp33", "mp362", "mp263"), ("mp61", "mp291")
 
 
 def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
@@ -115,23 +115,30 @@ def region_faces(mask, faces):
     return mask[faces].all(axis=1)
 
 
-def lid_rim_faces(vertices, faces, lines, canthi=(), rim_mm=RIM_MM):
-    """(m,) bool: faces within rim_mm of a lid margin: the thickness of the lids, which belongs to the eye opening.
+def rim_faces(vertices, faces, lines, ends, rim_mm):
+    """(m,) bool: faces within rim_mm of lines of contact (each (k,)): the thickness of lids and lips.
 
-    canthi (c, 3): where lids meet; between a margin's end and the canthus before it, the groove is part of the opening
+    ends (c, 3): canthi or corners; between a line's end and the corner before it, the groove is part of the opening
     """
-    margins = [vertices[line] for name, line in lines.items() if name.startswith("lid_")]
-    ends = np.array([end for margin in margins for end in margin[[0, -1]]])
-    for canthus in canthi:
-        end = ends[np.linalg.norm(ends - canthus, axis=1).argmin()]
-        margins.append(np.linspace(end, canthus, 9))
+    margins = [vertices[line] for line in lines]
+    tips = np.array([tip for margin in margins for tip in margin[[0, -1]]])
+    for end in ends:
+        tip = tips[np.linalg.norm(tips - end, axis=1).argmin()]
+        margins.append(np.linspace(tip, end, 9))
     return cKDTree(np.concatenate(margins)).query(vertices[faces].mean(axis=1))[0] < rim_mm
 
 
-def lip_rim_faces(vertices, faces, lines, rim_mm=LIP_RIM_MM):
-    """(m,) bool: faces within rim_mm of the lips' line of contact, where they turn inward."""
-    seam = np.concatenate([vertices[lines[name]] for name in ("lip_seam_upper", "lip_seam_lower")])
-    return cKDTree(seam).query(vertices[faces].mean(axis=1))[0] < rim_mm
+def _rims(template, fit, lines):
+    """(m,) bool of the rims of lids, and of lips without them."""
+
+    def rim(prefix, landmarks, rim_mm):
+        known = [i for i, name in enumerate(template.landmarks.names) if name in landmarks]
+        ends = template.landmarks.positions(fit, template.faces)[known]
+        mine = [line for name, line in lines.items() if name.startswith(prefix)]
+        return rim_faces(fit, template.faces, mine, ends, rim_mm)
+
+    lids = rim("lid_", CANTHI, RIM_MM)
+    return lids, rim("lip_seam_", CORNERS, LIP_RIM_MM) & ~lids
 
 
 def measure_quality(scan, fit, template, regions=None, lines=None):
@@ -149,9 +156,7 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     skin = np.zeros(len(faces), bool)
     skin[template.skin.face_slice] = True
     folded = folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)
-    known = [i for i, name in enumerate(template.landmarks.names) if name in CANTHI]
-    rim = lid_rim_faces(fit, faces, lines, template.landmarks.positions(fit, faces)[known])
-    lip_rim = lip_rim_faces(fit, faces, lines) & ~rim
+    lid_rim, lip_rim = _rims(template, fit, lines)
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)
     inside = region_faces(regions["mouth_interior"], faces)
@@ -159,8 +164,8 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
         if part.name in ("teeth_upper", "teeth_lower", "tongue"):
             inside[part.face_slice] = True
     return {
-        "folded": int((~(rim | lip_rim)[folded]).sum()),
-        "folded_lid_rims": int(rim[folded].sum()),
+        "folded": int((~(lid_rim | lip_rim)[folded]).sum()),
+        "folded_lid_rims": int(lid_rim[folded].sum()),
         "folded_lip_rims": int(lip_rim[folded].sum()),
         "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),
         "lip_gap_mm": float(gaps.max()),

@@ -1,9 +1,10 @@
-"""Small knots of crossing faces, smoothed away."""
+"""Small knots of crossing faces, and faces that look the wrong way, smoothed away."""
 
 import numpy as np
 
 from facewright.mesh.adjacency import dilate, vertex_adjacency
 from facewright.mesh.intersect import self_intersections
+from facewright.mesh.normals import face_cross, normalized
 
 
 def untangled(vertices, faces, keep, *, rounds=60):
@@ -23,4 +24,25 @@ def untangled(vertices, faces, keep, *, rounds=60):
         if not knot.any():
             break
         moved[knot] = 0.5 * moved[knot] + 0.5 * ((A @ moved) / degree)[knot]
+    return moved
+
+
+def unfolded(vertices, faces, expected, keep, *, limit=0.2, rounds=40):
+    """Vertices (n, 3) with the few faces that look away from where they should smoothed with their neighbours.
+
+    expected (m, 3) unit normals, zero where nothing is known; keep (n,) bool: vertices that stay
+    limit    least cosine of a face's normal with what is expected
+    """
+    moved = vertices.copy()
+    A = vertex_adjacency(faces, len(vertices))
+    degree = np.maximum(np.asarray(A.sum(axis=1)), 1)
+    known = expected.any(axis=1)
+    for _ in range(rounds):
+        away = np.einsum("mc,mc->m", normalized(face_cross(moved, faces)), expected) < limit * known
+        loose = np.zeros(len(vertices), bool)
+        loose[faces[away].ravel()] = True
+        loose &= ~keep
+        if not loose.any():
+            break
+        moved[loose] = 0.5 * moved[loose] + 0.5 * ((A @ moved) / degree)[loose]
     return moved

@@ -9,6 +9,7 @@ import numpy as np
 from facewright.data import Material, Mesh, Rig
 from facewright.parts.fit import fit_skeleton
 from facewright.parts.iris import EyeLook, paint_eye
+from facewright.parts.paint import PAINTERS
 from facewright.transfer.eyeball import measure_eyeball
 from facewright.transfer.halves import split_in_halves
 from facewright.working_set import read_working_set
@@ -20,8 +21,8 @@ SKIN_MAPS = ("albedo", "normal")
 @dataclass(frozen=True)
 class AssemblyOptions:
     """eyes      how eyes are painted; None leaves them plain
-    left_out  parts that the rig shall not have, by the beginning of their names. Lash cards and the veils around the
-              eye have no textures of their own and are made for one size of ball: worse than nothing
+    left_out  parts that the rig shall not have, by the beginning of their names, unless their material says how they
+              are painted: bare lash cards and veils around the eye are worse than nothing
     """
 
     eyes: EyeLook | None = field(default_factory=EyeLook)
@@ -49,7 +50,7 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
     meshes = []
     for part in template.parts:
-        if part.name.startswith(options.left_out):
+        if part.name.startswith(options.left_out) and "paint" not in template.materials[part.material]:
             continue
         material, painted = _material(template, part, used, options)
         used.update(painted)
@@ -142,6 +143,10 @@ def _material(template, part, maps, options):
         # Through the pupil of a separate iris its own back is seen, from within.
         plain |= {"color": (1.0, 1.0, 1.0), "double_sided": part.name != part.attach}
         return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
+    if "paint" in look:
+        name = f"{part.material}_albedo"
+        painted = {} if name in maps else {name: PAINTERS[look["paint"]](look)}
+        return Material(part.material, **plain | {"color": (1.0, 1.0, 1.0)}, albedo=name), painted
     return Material(part.material, **plain), {}
 
 

@@ -55,7 +55,7 @@ def fit_parts(face, options=None):
         stats[f"eye_{side}"] = {"radius_mm": ball.radius, "center_mm": ball.center.tolist(), **lids}
     mouth = [part for part in template.parts if part.attach in ("skull", "jaw")]
     if mouth:
-        V, stats["mouth"] = _fit_mouth(template, V, mouth, options)
+        V, stats["mouth"] = _fit_mouth(template, V, face.lines, mouth, options)
     for part in template.parts[1:]:
         if part.attach == "skin":
             V[part.vertex_slice] = _carried(template, V, part)
@@ -82,10 +82,11 @@ def fit_skeleton(template, vertices):
     return Skeleton(template.skeleton.names, template.skeleton.parents, np.array(positions))
 
 
-def _fit_mouth(template, vertices, parts, options):
+def _fit_mouth(template, vertices, lines, parts, options):
     """Teeth, gums and tongue by one similarity of the skin around them, so that the bite stays as it is.
 
-    Only the outer skin counts where there is any: nobody scans the inside of a closed mouth.
+    Only the outer skin counts where there is any: nobody scans the inside of a closed mouth. Edges stand to the line
+    where the lips meet as they do on the template: that decides how much of them a smile shows.
     """
     index = np.concatenate([np.arange(*part.vertices) for part in parts])
     rest = template.vertices[index]
@@ -94,6 +95,8 @@ def _fit_mouth(template, vertices, parts, options):
     weights = np.exp(-0.5 * (distance / _MOUTH_REACH_MM) ** 2)
     R, scale, t = best_similarity(template.vertices[skin], vertices[skin], weights, options.mouth_scale)
     placed = scale * rest @ R.T + t
+    there, here = _lip_line(template.vertices, template.lines), _lip_line(vertices, lines)
+    placed += (here - scale * R @ there - t) * [1.0, 1.0, 0.0]
     front = _front_teeth(template, parts)
     depth, share = _Mouth(template, template.vertices).misplaced(rest[front])
     allowed = np.array([scale * depth + options.poke_mm, share + options.show_share])
@@ -109,6 +112,15 @@ def _fit_mouth(template, vertices, parts, options):
     result[index] = placed - [0.0, 0.0, steps[best]]
     stats = {"scale": scale, "moved_back_mm": float(steps[best])}
     return result, stats | {"deepest_in_skin_mm": float(tried[best][0]), "seen_from_front_share": float(tried[best][1])}
+
+
+def _lip_line(vertices, lines):
+    """(3,) middle of the middle third of the line where the lips meet."""
+    points = []
+    for name in ("lip_seam_upper", "lip_seam_lower"):
+        line = vertices[lines[name]]
+        points.append(line[len(line) // 3 : len(line) - len(line) // 3].mean(axis=0))
+    return np.mean(points, axis=0)
 
 
 def _front_teeth(template, parts):

@@ -9,8 +9,9 @@ import numpy as np
 from facewright.data import Face
 from facewright.mesh.adjacency import dilate
 from facewright.mesh.intersect import self_intersections
+from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
-from facewright.mesh.untangle import untangled
+from facewright.mesh.untangle import unfolded, untangled
 from facewright.register.correspond import Target
 from facewright.register.interior import tuck_interior
 from facewright.register.leading import leading_lines
@@ -29,6 +30,7 @@ SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
 # Rings of vertices around a knot in which everything gives way, tried in turn.
 GIVING_WAY = (0, 1, 2, 3)
+FOLD_MM = 3.0  # a face is only held to look as the scan does where the scan is this near
 KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
@@ -70,6 +72,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     interior, outer, led = _interior(template)
     fit = model.vertices.copy()
     fit[:stop] = _without_knots(template, tuck_interior(skin, faces, interior, outer, led), faces)
+    fit[:stop] = _unfolded(template, fit[:stop], faces, matches)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
@@ -137,10 +140,20 @@ def _fit_model(template, target, pairs, closed, options):
     return model, names
 
 
+def _unfolded(template, skin, faces, matches):
+    """Skin (n, 3) without faces of the lips that look away from the scan, as in the groove at a corner."""
+    n = len(skin)
+    asked = (template.regions["lips"] & template.regions["outer"])[:n] & (matches.distance < FOLD_MM)
+    expected = normalized(matches.normals[faces].sum(axis=1)) * asked[faces].all(axis=1)[:, None]
+    keep = np.zeros(n, bool)
+    keep[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
+    return unfolded(skin, faces, expected, keep)
+
+
 def _without_knots(template, skin, faces):
     """Skin (n, 3) with the knots of lips and lids smoothed away.
 
-    The lip seam and the skin beside them hold; where a knot does not come loose, what lies around it gives way too.
+    The lip seam and the skin beside them hold; what lies around a knot gives way only where it does not come loose.
     """
     n = len(skin)
     knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)

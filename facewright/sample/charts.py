@@ -52,9 +52,7 @@ def charts(V, F):
     chart = np.full(len(F), -1)
     chart_direction = []
     left = np.ones(len(F), bool)
-    for _ in range(12):
-        if not left.any():
-            break
+    while left.any():
         for d in range(len(units)):
             mine = np.flatnonzero(left & (direction == d))
             mine = mine[_on_top(V, F[mine], units[d])] if len(mine) else mine

@@ -82,12 +82,13 @@ def _parsed(path, name, value):
 def write_landmarks(path, landmarks, scan, *, names=None):
     """Write landmarks of a scan in the coordinates of its file, to be moved by hand and given back.
 
-    landmarks Landmarks on the scan's faces; names: which ones, default all with a weight
+    landmarks Landmarks on the scan's faces
+    names     which ones: landmark name -> the name to write; default all with a weight, by their own names
     """
     path = Path(path)
     points = landmarks.positions(scan.vertices, scan.faces) @ scan.T_ours_to_scan[:3, :3].T + scan.T_ours_to_scan[:3, 3]
     table = {
-        name: [float(f"{value:.7g}") for value in point]
+        name if names is None else names[name]: [float(f"{value:.7g}") for value in point]
         for name, point, weight in zip(landmarks.names, points, landmarks.weights)
         if weight > 0 and (names is None or name in names)
     }

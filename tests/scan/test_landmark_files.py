@@ -37,8 +37,10 @@ def test_round_trip(tmp_path, landmarks_on_wall):
 
 def test_some_names_only(tmp_path, landmarks_on_wall):
     wall, landmarks = landmarks_on_wall
-    write_landmarks(tmp_path / "a.json", landmarks, wall, names={"mp61", "mp2", "mp291"})
-    assert sorted(read_landmarks(tmp_path / "a.json")) == ["mp291", "mp61"]
+    write_landmarks(
+        tmp_path / "a.json", landmarks, wall, names={"mp61": "mouth_corner_right", "mp2": "a", "mp291": "mp291"}
+    )
+    assert sorted(read_landmarks(tmp_path / "a.json")) == ["mouth_corner_right", "mp291"]
     assert not list(tmp_path.glob("*.part"))
 
 

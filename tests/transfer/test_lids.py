@@ -47,7 +47,7 @@ def test_shapes_that_hardly_move_the_lids_are_hardly_touched(hm08, bulging):
     plain = transfer_shapes(bulging, TransferOptions(contact=None))
     changed = np.abs(clear_lids(bulging, plain) - plain).max(axis=(1, 2))
     assert changed[hm08.shape_names.index("eyeBlinkLeft")] > 0.1
-    assert changed[hm08.shape_names.index("tongueOut")] == 0
+    assert changed[hm08.shape_names.index("tongueOut")] < 1e-3
     for name in ("jawOpen", "mouthFunnel", "mouthSmileLeft"):
         assert changed[hm08.shape_names.index(name)] < 0.2, name
 

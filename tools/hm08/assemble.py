@@ -17,23 +17,26 @@ from facewright.template.modifiers import Modifiers, build_modes, mean_weights
 from hm08.carry import Carrier
 from hm08.control import build_control
 from hm08.head import build_head
-from hm08.parts import eye_pair, simple_part
+from hm08.mouth import deepen_fold
+from hm08.parts import Piece, control_points, eye_pair, mouth_pieces, mouth_rows
 from hm08.regions import EAR_TARGETS, skin_regions
 from hm08.shapes import build_shapes
 from hm08.shapes.eyes import eye_turn
 from hm08.shapes.jaw import rigid_motion
 from hm08.skeleton import build_skeleton, hinge_of, skin_weights
 from hm08.source import read_base, read_face_units, read_macros, read_modifiers
-from hm08.uv import build_atlas, unwrap_part
+from hm08.teeth import CELLS
+from hm08.tongue import OUT_JAW
+from hm08.uv import build_atlas
 
 N_MODES = 100
-ATTACH = {"teeth_upper": "skull", "teeth_lower": "jaw", "tongue": "jaw"}
 JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 MATERIALS = {
     "skin": {"color": (0.60, 0.38, 0.29), "roughness": 0.55, "alpha": 1.0},
     "eye": {"color": (0.85, 0.83, 0.80), "roughness": 0.12, "alpha": 1.0},
-    "teeth": {"color": (0.80, 0.74, 0.62), "roughness": 0.25, "alpha": 1.0},
-    "tongue": {"color": (0.55, 0.20, 0.19), "roughness": 0.40, "alpha": 1.0},
+    "teeth": {"color": (0.76, 0.70, 0.58), "roughness": 0.18, "alpha": 1.0, "paint": "teeth", "cells": CELLS},
+    "tongue": {"color": (0.50, 0.19, 0.18), "roughness": 0.34, "alpha": 1.0, "paint": "tongue"},
+    "gums": {"color": (0.52, 0.20, 0.19), "roughness": 0.28, "alpha": 1.0, "paint": "gums", "double_sided": True},
 }
 INFO = {
     "name": "hm08",
@@ -66,22 +69,23 @@ class Assembly:
         self.vertices, self.faces, self.polygons, self.uv, self.uv_faces, self.uv_polygons = ([] for _ in range(6))
         self.mirror, self.parts = [], []
 
-    def add(self, name, vertices, polygons, uv, uv_polygons, mirror, material, attach):
-        """One part with its own indices; mirror counts from the part's first vertex."""
+    def add(self, piece):
+        """One Piece; its mirror counts from the part's first vertex."""
         start, uv_start = self._count(self.vertices), self._count(self.uv)
         face_start = self._count(self.faces)
-        faces, uv_faces = triangulated(polygons)[0], triangulated(uv_polygons)[0]
-        self.vertices.append(vertices)
-        self.uv.append(uv)
+        faces, uv_faces = triangulated(piece.polygons)[0], triangulated(piece.uv_polygons)[0]
+        self.vertices.append(piece.vertices)
+        self.uv.append(piece.uv)
         for store, value, shift in (
             (self.faces, faces, start),
             (self.uv_faces, uv_faces, uv_start),
-            (self.polygons, polygons, start),
-            (self.uv_polygons, uv_polygons, uv_start),
+            (self.polygons, piece.polygons, start),
+            (self.uv_polygons, piece.uv_polygons, uv_start),
         ):
             store.append(np.where(value >= 0, value + shift, -1))
-        self.mirror.append(mirror + start)
-        part = Part(name, (start, start + len(vertices)), (face_start, face_start + len(faces)), material, attach)
+        self.mirror.append(piece.mirror + start)
+        stop = start + len(piece.vertices)
+        part = Part(piece.name, (start, stop), (face_start, face_start + len(faces)), piece.material, piece.attach)
         self.parts.append(part)
         return part
 
@@ -103,15 +107,16 @@ def build_asset(source, *, say=lambda text: None):
         delta = deltas[names.index(f"l-{target}")][control.original[: control.n_skin]]
         ear = np.maximum(ear, np.linalg.norm(delta, axis=1) > 0.3)
     regions = skin_regions(head, control, ear)
+    head = deepen_fold(head, regions)
     say("atlas")
     uv, uv_polygons, _ = build_atlas(head.V, head.polygons, head.mirror, regions, head.V_open)
-    assembly = _assemble(control, head, uv, uv_polygons)
+    assembly, tongue_out = _assemble(head, uv, uv_polygons)
     say("shapes")
     raw = read_face_units(source, n_base, ARKIT_SHAPES)[:, control.original] * control.scale
     turns = {name: _jaw_motion(name, raw, control) for name in JAW_SHAPES}
     jaw = turns["jawOpen"]
     skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions, jaw)
-    skin_deltas = _with_parts(skin_deltas, raw, turns, control, head, assembly)
+    shapes = _with_parts(skin_deltas, turns, head, assembly, tongue_out)
     say("identity")
     names, fields = _carried(names, deltas, macros, control, head)
     operator = _operator(control, head, assembly)
@@ -125,58 +130,61 @@ def build_asset(source, *, say=lambda text: None):
     )
     modes = build_modes(modifiers, n_modes=N_MODES)
     say("landmarks and openness")
-    template = _template(assembly, head, regions, control, skin_deltas, operator, modes, jaw)
+    template = _template(assembly, head, regions, control, shapes, operator, modes, jaw)
     return Asset(template, {"operator": operator, "identity": modes}, modifiers)
 
 
-def _assemble(control, head, uv, uv_polygons):
+def _assemble(head, uv, uv_polygons):
+    """The Assembly, and the tongue's vertices when it is out."""
     assembly = Assembly()
-    assembly.add("skin", head.V, head.polygons, uv, uv_polygons, head.mirror, "skin", "skin")
+    assembly.add(Piece("skin", head.V, head.polygons, uv, uv_polygons, head.mirror, "skin", "skin"))
     eyes = eye_pair(head.eye_center)
     k = len(eyes["eye_left"][0])
     for side, name in ((1, "eye_left"), (-1, "eye_right")):
         vertices, polygons, eye_uv = eyes[name]
-        assembly.add(name, vertices, polygons, eye_uv, polygons, np.arange(k) + side * k, "eye", name)
-    for name, attach in ATTACH.items():
-        vertices, polygons, mirror, _ = simple_part(control, name)
-        part_uv = unwrap_part(vertices, polygons)
-        material = "tongue" if name == "tongue" else "teeth"
-        assembly.add(name, vertices, polygons, part_uv, polygons, mirror, material, attach)
-    return assembly
+        assembly.add(Piece(name, vertices, polygons, eye_uv, polygons, np.arange(k) + side * k, "eye", name))
+    pieces, tongue_out = mouth_pieces()
+    for piece in pieces:
+        assembly.add(piece)
+    return assembly, tongue_out
 
 
-def _jaw_motion(name, raw, control):
-    """R, t: the rigid motion of the lower teeth in a jaw shape, symmetric where the shape is."""
-    index = simple_part(control, "teeth_lower")[3]
-    teeth = control.vertices[index]
-    own = raw[ARKIT_SHAPES.index(name)][index]
-    other = raw[ARKIT_SHAPES.index(mirrored_name(name))][control.mirror[index]] * [-1, 1, 1]
-    return rigid_motion(teeth, teeth + 0.5 * (own + other))
-
-
-def _with_parts(skin, raw, turns, control, head, assembly):
+def _with_parts(skin, turns, head, assembly, tongue_out):
     """(52, n, 3) deltas of all parts; turns: jaw shape -> (R, t)."""
     n = sum(len(v) for v in assembly.vertices)
+    vertices = np.concatenate(assembly.vertices)
     deltas = np.zeros((len(ARKIT_SHAPES), n, 3))
     deltas[:, : skin.shape[1]] = skin
-    part = {p.name: p.vertex_slice for p in assembly.parts}
-    index = {name: simple_part(control, name)[3] for name in ATTACH}
-    teeth, tongue = control.vertices[index["teeth_lower"]], control.vertices[index["tongue"]]
+    on_jaw = np.concatenate([np.full(len(v), p.attach == "jaw") for p, v in zip(assembly.parts, assembly.vertices)])
     for name, (R, t) in turns.items():
-        i = ARKIT_SHAPES.index(name)
-        deltas[i, part["teeth_lower"]] = teeth @ R.T + t - teeth
-        deltas[i, part["tongue"]] = tongue @ R.T + t - tongue
-    i = ARKIT_SHAPES.index("tongueOut")
-    out = raw[i][index["tongue"]]
-    mirrored = raw[i][control.mirror[index["tongue"]]] * [-1, 1, 1]
-    deltas[i, part["tongue"]] = 0.5 * (out + mirrored)
+        deltas[ARKIT_SHAPES.index(name), on_jaw] = (vertices @ R.T + t - vertices)[on_jaw]
+    _stick_out(deltas, assembly, tongue_out, turns["jawOpen"])
     for i, name in enumerate(ARKIT_SHAPES):
         if name.startswith("eyeLook"):
             side = "eye_left" if name.endswith("Left") else "eye_right"
             center = head.eye_center * ([1, 1, 1] if side == "eye_left" else [-1, 1, 1])
-            vertices = assembly.vertices[[p.name for p in assembly.parts].index(side)]
-            deltas[i, part[side]] = eye_turn(name, vertices, center)
+            part = next(p for p in assembly.parts if p.name == side)
+            deltas[i, part.vertex_slice] = eye_turn(name, vertices[part.vertex_slice], center)
     return deltas
+
+
+def _jaw_motion(name, raw, control):
+    """R, t of the jaw in a shape: how hm08's own lower teeth go, both sides made even."""
+    index = control_points(control, "teeth_lower")
+    own = raw[ARKIT_SHAPES.index(name)][index]
+    other = raw[ARKIT_SHAPES.index(mirrored_name(name))][control.mirror[index]] * [-1.0, 1.0, 1.0]
+    teeth = control.vertices[index]
+    return rigid_motion(teeth, teeth + 0.5 * (own + other))
+
+
+def _stick_out(deltas, assembly, tongue_out, jaw):
+    """tongueOut, in place: a share of jawOpen parts teeth and lips, the tongue comes out between them."""
+    R, t = jaw
+    i = ARKIT_SHAPES.index("tongueOut")
+    deltas[i] = OUT_JAW * deltas[ARKIT_SHAPES.index("jawOpen")]
+    part = next(p for p in assembly.parts if p.name == "tongue")
+    rest = assembly.vertices[assembly.parts.index(part)]
+    deltas[i, part.vertex_slice] = tongue_out + OUT_JAW * (tongue_out @ R.T + t - tongue_out) - rest
 
 
 def _carried(names, deltas, macros, control, head):
@@ -191,16 +199,16 @@ def _carried(names, deltas, macros, control, head):
 
 
 def _operator(control, head, assembly):
-    """(n, c + 2) csr: skin by subdivision, teeth and tongue point by point, eyeballs by their centres."""
+    """(n, c + 2) csr: skin by subdivision, the mouth's parts as hm08's own teeth and tongue go, eyes by centres."""
     c = len(control.vertices)
     blocks = [sp.hstack([head.S, sp.csr_matrix((len(head.V), c - control.n_skin + 2))])]
     for part, vertices in zip(assembly.parts[1:], assembly.vertices[1:]):
         k = len(vertices)
-        if part.name.startswith("eye"):
-            column = np.full(k, c + (part.name == "eye_right"))
-        else:
-            column = simple_part(control, part.name)[3]
-        blocks.append(sp.csr_matrix((np.ones(k), (np.arange(k), column)), shape=(k, c + 2)))
+        columns, weights = np.array([c + (part.name == "eye_right")]), np.ones((k, 1))
+        if part.attach in ("skull", "jaw"):
+            columns, weights = mouth_rows(control, vertices)
+        at = (np.repeat(np.arange(k), len(columns)), np.tile(columns, k))
+        blocks.append(sp.csr_matrix((weights.ravel(), at), shape=(k, c + 2)))
     return sp.vstack(blocks).tocsr()
 
 

@@ -322,17 +322,3 @@ def fit(uv, place):
     u0, v0, u1, v1 = place.box
     scale = ((np.array([u1 - u0, v1 - v0]) - 2 * MARGIN) / (high - low)).min()
     return (uv - 0.5 * (low + high)) * scale + [0.5 * (u0 + u1), 0.5 * (v0 + v1)]
-
-
-def unwrap_part(vertices, polygons):
-    """uv (t, 2) of a small part in its own square: its connected sheets one above the other, seen around the mouth."""
-    label = vertex_components(triangulated(polygons)[0], len(vertices))
-    count = label.max() + 1
-    uv = np.zeros((len(vertices), 2))
-    for sheet in range(count):
-        mine = label == sheet
-        turn = np.arctan2(vertices[mine, 0], vertices[mine, 2] - vertices[mine, 2].min() + 10.0)
-        plane = np.stack([turn, vertices[mine, 1]], axis=1)
-        plane = (plane - plane.min(axis=0)) / np.ptp(plane, axis=0)
-        uv[mine] = (0.02 + 0.96 * plane + [0, sheet]) / [1, count]
-    return uv
