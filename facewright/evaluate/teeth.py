@@ -8,6 +8,7 @@ from itertools import pairwise
 import igl
 import numpy as np
 
+from facewright.evaluate.rows import Row
 from facewright.expand import expand_weights
 from facewright.mesh.adjacency import vertex_components
 from facewright.mesh.closest import Surface
@@ -50,7 +51,7 @@ def measure_mouth(rig):
                       single shape that moves the mouth, and mouth_pairs; a tongue that is out is left out
     teeth_moved_mm    most that an upper tooth moves under any target
     """
-    singles = [name for name in rig.target_names if not set(name) & set("@+")]
+    singles = rig.plain().target_names
     poses = {name: _with_jaw(name) for name in singles} | mouth_pairs()
     through = {}
     for name, weights in poses.items():
@@ -66,6 +67,22 @@ def measure_mouth(rig):
         "through_skin_mm2": through,
         "teeth_moved_mm": max((float(np.abs(mesh.deltas).max()) for mesh in upper), default=0.0),
     }
+
+
+def teeth_rows(rig):
+    """Rows of measure_mouth beside their bars; the tongue's and the teeth's own are apart from the lips' (mouth.py)."""
+    if not any(mesh.name.startswith("teeth_upper") for mesh in rig.meshes):
+        return []
+    found = measure_mouth(rig)
+    rows = [Row("teeth", "smile + jawOpen 0.3", "upper teeth shown", *found["teeth_shown"], bar=(TEETH_BAR, None))]
+    tongue = found["tongue_in_lips_mm"]
+    rows.append(Row("teeth", "tongueOut + jawOpen 0.5", "tongue in lips mm", *tongue, bar=(None, TONGUE_BAR_MM)))
+    rows.append(
+        Row("teeth", "tongueOut + jawOpen 0.5", "tip before the lips mm", found["tongue_out_mm"], bar=(0, None))
+    )
+    for pose, area in found["through_skin_mm2"].items():
+        rows.append(Row("teeth", pose, "seen through skin mm2", area, bar=(None, POKE_BAR_MM2)))
+    return rows
 
 
 def _with_jaw(name):
