@@ -14,6 +14,7 @@ ORDER = (
     "real_scans",
     "invariance",
     "job",
+    "iris",
     "compression",
     "compression_web",
 )

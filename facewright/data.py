@@ -97,7 +97,8 @@ class Part:
     vertices  (start, stop) in the template's vertex array
     faces     (start, stop) in the template's face array
     material  name of a material in Template.materials
-    attach    what carries it: "skin" (deforms with the head), "skull", "jaw", "eye_left", "eye_right"
+    attach    what carries it: "skin" (deforms with the head), "skull", "jaw", "eye_left", "eye_right", "lid_left" or
+              "lid_right" (rides on that eye's lids)
     """
 
     name: str

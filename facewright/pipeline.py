@@ -18,14 +18,14 @@ from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
 from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
-from facewright.parts import AssemblyOptions, build_rig, fit_parts
+from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, build_rig, find_irises, fit_parts
 from facewright.read import read_scan
 from facewright.read.named import named_files
 from facewright.register import RegisterOptions, register
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
-from facewright.transfer import transfer_shapes
+from facewright.transfer import ride_on_lids, transfer_shapes
 from facewright.write.credits import write_credits
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
@@ -59,6 +59,7 @@ class JobOptions:
     up            the scan's up axis (x, y, z, -x, -y, -z); default: found
     mirror        the scan is a mirror image of the person: turn it round
     eyes          "template": closed lids are opened to the template's aperture; "as-scanned": left as they are
+    iris          pattern of the irises, one of parts.PATTERNS; their colour is the scan's where it shows them
     landmarks     JSON file with landmarks placed by hand; each overrides the one that was found
     formats       what to write: glb, obj
     shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": left and right halves in
@@ -75,6 +76,7 @@ class JobOptions:
     up: str | None = None
     mirror: bool = False
     eyes: str = "template"
+    iris: str = "fibres"
     landmarks: str | None = None
     formats: tuple[str, ...] = ("glb",)
     shapes: str = "apple"
@@ -84,6 +86,8 @@ class JobOptions:
     def __post_init__(self):
         if self.eyes not in ("template", "as-scanned"):
             raise ValueError(f"eyes is 'template' or 'as-scanned', got {self.eyes!r}")
+        if self.iris not in PATTERNS:
+            raise ValueError(f"iris is one of {', '.join(PATTERNS)}, got {self.iris!r}")
         if self.shapes not in ("apple", "full"):
             raise ValueError(f"shapes is 'apple' or 'full', got {self.shapes!r}")
         if not self.formats or not set(self.formats) <= {"glb", "obj"}:
@@ -166,7 +170,7 @@ def _run_job(run, path, output, options, inputs, template, folder):
     scan, clean_stats = _read(run, path, options, inputs)
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
-    face = _parts(run, face, template)
+    face = _parts(run, scan, face, template)
     shapes, figures = _transfer(run, face, template, options.jobs)
     maps = _bake(run, scan, face, options)
     report = _write(run, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
@@ -223,9 +227,9 @@ def _register(run, scan, landmarks, placed, template, folder, options):
     return unpack_face(arrays, info, template)
 
 
-def _parts(run, face, template):
+def _parts(run, scan, face, template):
     def work():
-        return pack_face(part_lips(fit_parts(face)))
+        return pack_face(part_lips(fit_parts(face, irises=find_irises(scan, face))))
 
     arrays, info = run.stage("04-parts", work)
     return unpack_face(arrays, info, template)
@@ -233,7 +237,8 @@ def _parts(run, face, template):
 
 def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
-    return solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))), jobs=jobs)
+    skin = solve_mouth(face, solve_eyes(face, hold_neck(face, transfer_shapes(face))), jobs=jobs)
+    return _with_riders(face, skin)
 
 
 def rig_from_face(face, maps=None, jobs=1):
@@ -270,6 +275,15 @@ def _assembled(face, targets, maps=None, options=None):
     return rig if jaw is None else jaw.on_rig(rig)
 
 
+def _with_riders(face, shapes):
+    """The shapes with lashes and all else that rides on the lids as their final skin wants it."""
+    names = [*face.template.shape_names, *shapes.extras]
+    deltas = np.concatenate([shapes.deltas, *(delta[None] for delta in shapes.extras.values())])
+    deltas = ride_on_lids(face, deltas, names, shapes.correctives)
+    n = len(shapes.deltas)
+    return replace(shapes, deltas=deltas[:n], extras=dict(zip(shapes.extras, deltas[n:])))
+
+
 def _bake(run, scan, face, options):
     bake_options = BakeOptions(size=options.texture_size)
 
@@ -284,7 +298,7 @@ def _write(run, scan, face, shapes, figures, maps, found, output, options):
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
-        rig = _assembled(face, shapes, maps)
+        rig = _assembled(face, shapes, maps, AssemblyOptions(eyes=EyeLook(pattern=options.iris)))
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
         carried = rig.full() if options.shapes == "full" else rig.plain()
         report = plain(build_report(scan, face, carried, *found) | figures)
@@ -296,7 +310,9 @@ def _write(run, scan, face, shapes, figures, maps, found, output, options):
     def intact(info):
         return output.holds(info["files"])
 
-    return run.stage("07-write", work, [*sorted(options.formats), options.shapes], intact=intact)[1]["report"]
+    return run.stage("07-write", work, [*sorted(options.formats), options.shapes, options.iris], intact=intact)[1][
+        "report"
+    ]
 
 
 def write_results(rig, maps, scan, face, folder, options):

@@ -17,6 +17,7 @@ from facewright.cli.progress import ProgressLine
 from facewright.conventions import MM_PER_UNIT
 
 HELP = "make a rig from one head scan"
+IRIS_PATTERNS = ("fibres", "crypts", "furrows", "flower", "burst", "speckled")
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 SHAPES_HELP = (
     "apple: exactly the 52 ARKit shapes; full: left and right halves of the shapes that move both sides, in-betweens "
@@ -35,6 +36,12 @@ def add_job_arguments(parser):
         choices=("template", "as-scanned"),
         default="template",
         help="closed lids: open them to the template's aperture, or leave them (default: template)",
+    )
+    parser.add_argument(
+        "--iris",
+        choices=IRIS_PATTERNS,
+        default="fibres",
+        help="pattern of the irises (default: fibres); the colour is the scan's where its eyes are open",
     )
     parser.add_argument(
         "--formats", type=_formats, default=("glb",), metavar="LIST", help="glb, obj, comma-separated (default: glb)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from facewright.evaluate.blends import blend_rows
 from facewright.evaluate.expressions import expression_rows
 from facewright.evaluate.eyes import eye_rows
+from facewright.evaluate.lashes import lash_rows
 from facewright.evaluate.mouth import lip_crossing, mouth_rows
 from facewright.evaluate.rig import measure_jaw
 from facewright.evaluate.rows import Row
@@ -15,14 +16,14 @@ BLENDS = 1000
 
 
 def rig_rows(rig, blends=BLENDS):
-    """list of rows.Row of a data.Rig: eyes, mouth, teeth, jaw, shapes, expressions, `blends` blends and fewer mixes.
+    """list of rows.Row of a data.Rig: eyes, mouth, jaw, teeth, lashes, shapes, expressions, `blends` blends, a fifth as
+    many mixes.
 
     What a rig does not say (a GLB has no regions and no feature lines) is left out.
     """
     whole = bool(rig.regions and rig.lines)
-    rows = [*eye_rows(rig), *(mouth_rows(rig) if whole else ())]
-    rows += [*teeth_rows(rig), *jaw_rows(rig)] if whole else []
-    rows += [*shape_rows(rig), *expression_rows(rig)]
+    rows = [*eye_rows(rig), *(mouth_rows(rig) if whole else ()), *(jaw_rows(rig) if whole else ())]
+    rows += [*(teeth_rows(rig) if whole else ()), *lash_rows(rig), *shape_rows(rig), *expression_rows(rig)]
     return rows + blend_rows(rig, blends, lip_crossing(rig) if whole else None) if blends else rows
 
 

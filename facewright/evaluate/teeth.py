@@ -7,9 +7,11 @@ from itertools import pairwise
 
 import igl
 import numpy as np
+from scipy.ndimage import binary_opening
 
+from facewright.evaluate.play import Player
 from facewright.evaluate.rows import Row
-from facewright.expand import expand_weights
+from facewright.evaluate.shapes import shape_names
 from facewright.mesh.adjacency import vertex_components
 from facewright.mesh.closest import Surface
 from facewright.mesh.raster import Camera, RayScene
@@ -51,15 +53,15 @@ def measure_mouth(rig):
                       single shape that moves the mouth, and mouth_pairs; a tongue that is out is left out
     teeth_moved_mm    most that an upper tooth moves under any target
     """
-    singles = rig.plain().target_names
+    singles = shape_names(rig)
     poses = {name: _with_jaw(name) for name in singles} | mouth_pairs()
     through = {}
     for name, weights in poses.items():
         if set(weights) <= set(singles) and _moves_mouth(rig, weights):
             through[name] = _Mouth(rig, weights, True).through_skin_mm2()
     upper = [mesh for mesh in rig.meshes if mesh.name in ("teeth_upper", "gums_upper") and mesh.deltas is not None]
-    smile = [_Mouth(rig, SMILE, full) for full in (True, False)]
-    tongue = [_Mouth(rig, TONGUE, full) for full in (True, False)]
+    smile = [_Mouth(rig, _known(SMILE, rig), full) for full in (True, False)]
+    tongue = [_Mouth(rig, _known(TONGUE, rig), full) for full in (True, False)]
     return {
         "teeth_shown": tuple(mouth.teeth_shown() for mouth in smile),
         "tongue_in_lips_mm": tuple(mouth.tongue_in_flesh_mm() for mouth in tongue),
@@ -70,24 +72,30 @@ def measure_mouth(rig):
 
 
 def teeth_rows(rig):
-    """Rows of measure_mouth beside their bars; the tongue's and the teeth's own are apart from the lips' (mouth.py)."""
-    if not any(mesh.name.startswith("teeth_upper") for mesh in rig.meshes):
+    """Rows (rows.Row) of teeth, gums and tongue for `facewright evaluate rig`; none for a rig without them."""
+    if not any(mesh.name.startswith(INSIDE) for mesh in rig.meshes) or rig.meshes[0].deltas is None:
         return []
     found = measure_mouth(rig)
-    rows = [Row("teeth", "smile + jawOpen 0.3", "upper teeth shown", *found["teeth_shown"], bar=(TEETH_BAR, None))]
-    tongue = found["tongue_in_lips_mm"]
-    rows.append(Row("teeth", "tongueOut + jawOpen 0.5", "tongue in lips mm", *tongue, bar=(None, TONGUE_BAR_MM)))
-    rows.append(
-        Row("teeth", "tongueOut + jawOpen 0.5", "tip before the lips mm", found["tongue_out_mm"], bar=(0, None))
-    )
-    for pose, area in found["through_skin_mm2"].items():
-        rows.append(Row("teeth", pose, "seen through skin mm2", area, bar=(None, POKE_BAR_MM2)))
+    through = found["through_skin_mm2"]
+    worst = max(through, key=through.get, default="")
+    smile, tongue = "smile + jawOpen 0.3", "tongueOut + jawOpen 0.5"
+    rows = [Row("teeth", worst, "through the skin mm2", through.get(worst, 0.0), bar=(None, POKE_BAR_MM2))]
+    rows.append(Row("teeth", "any", "upper teeth move mm", found["teeth_moved_mm"], bar=(None, 0.0)))
+    if set(SMILE) <= set(rig.target_names):
+        rows.append(Row("teeth", smile, "upper teeth shown", *found["teeth_shown"], bar=(TEETH_BAR, None)))
+    if set(TONGUE) <= set(rig.target_names):
+        rows.append(Row("tongue", tongue, "in the lips mm", *found["tongue_in_lips_mm"], bar=(None, TONGUE_BAR_MM)))
+        rows.append(Row("tongue", tongue, "before the lips mm", found["tongue_out_mm"], bar=(0.0, None)))
     return rows
 
 
 def _with_jaw(name):
     """Weights of a single shape; mouthClose means something with an open jaw only."""
     return {name: 1.0} | ({"jawOpen": 1.0} if name == "mouthClose" else {})
+
+
+def _known(weights, rig):
+    return {name: weight for name, weight in weights.items() if name in rig.target_names}
 
 
 def _moves_mouth(rig, weights):
@@ -105,14 +113,13 @@ class _Mouth:
     """A rig in one pose, seen from VIEWS around the mouth."""
 
     def __init__(self, rig, weights, full):
-        if full:
-            weights = expand_weights(weights, rig.in_betweens, rig.correctives)
+        play = Player(rig, full)
         self.rig = rig
         meshes = [mesh for mesh in rig.meshes if mesh is rig.meshes[0] or mesh.name.startswith(INSIDE)]
         self.names = [mesh.name for mesh in meshes]
         # The last entry is for rays that meet nothing: their face is -1, and so is its number.
         self.may_pass = np.array([name == "tongue" and "tongueOut" in weights for name in self.names] + [True])
-        self.posed = [_posed(rig, mesh, weights) for mesh in meshes]
+        self.posed = [play(mesh, weights) for mesh in meshes]
         self.meshes = meshes
         start = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
         self.faces = np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, start)])
@@ -151,7 +158,12 @@ class _Mouth:
             if len(inner):
                 gate = RayScene(*opening).cast(origins[inner], directions[inner])
                 passed = (gate.face >= 0) & (gate.distance < hits.distance[inner] + _LIPS_MM)
-                most = max(most, float((~passed).sum()) * _MM_PER_PIXEL**2)
+                outside = np.zeros(len(origins), bool)
+                outside[inner] = ~passed
+                side = round(np.sqrt(len(origins)))
+                # A row of pixels along the lips' outline says nothing: there a ray grazes both.
+                patches = binary_opening(outside.reshape(side, side), np.ones((2, 2)))
+                most = max(most, float(patches.sum()) * _MM_PER_PIXEL**2)
         return most
 
     def tongue_in_flesh_mm(self):
@@ -172,13 +184,6 @@ class _Mouth:
             return 0.0
         tip = self.posed[self.names.index("tongue")][:, 2].max()
         return float(tip - max(self.upper[:, 2].max(), self.lower[:, 2].max()))
-
-
-def _posed(rig, mesh, weights):
-    if mesh.deltas is None:
-        return mesh.vertices
-    number = rig.target_names.index
-    return mesh.vertices + sum(weight * mesh.deltas[number(name)] for name, weight in weights.items())
 
 
 def _strip(upper, lower):

@@ -17,7 +17,7 @@ from facewright.mesh.tangents import corner_tangents, from_tangent_space
 
 CLAY_LINEAR = srgb_to_linear(np.array(CLAY))
 AMBIENT = 0.16
-MAX_LAYERS = 4
+MAX_LAYERS = 12
 MIN_ROUGHNESS = 0.18
 EDGE_THRESHOLD = 0.04
 RAY_CHUNK = 1 << 17

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,8 +21,8 @@ SKIN_MAPS = ("albedo", "normal")
 @dataclass(frozen=True)
 class AssemblyOptions:
     """eyes      how eyes are painted; None leaves them plain
-    left_out  parts that the rig shall not have, by the beginning of their names, unless their material says how they
-              are painted: bare lash cards and veils around the eye are worse than nothing
+    left_out  parts that the rig shall not have, by the beginning of their names, where they just hang on the skin:
+              lash cards without a texture and veils made for one size of ball are worse than nothing
     """
 
     eyes: EyeLook | None = field(default_factory=EyeLook)
@@ -38,6 +38,9 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
     """
     options = options or AssemblyOptions()
+    seen = face.stats.get("parts", {}).get("iris_color")
+    if options.eyes is not None and options.eyes.iris_color is None and seen is not None:
+        options = replace(options, eyes=replace(options.eyes, iris_color=tuple(seen)))
     maps = maps or {}
     template = face.template
     words = read_working_set()
@@ -50,7 +53,7 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
     meshes = []
     for part in template.parts:
-        if part.name.startswith(options.left_out) and "paint" not in template.materials[part.material]:
+        if part.attach == "skin" and part.name.startswith(options.left_out):
             continue
         material, painted = _material(template, part, used, options)
         used.update(painted)

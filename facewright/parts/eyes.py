@@ -26,6 +26,7 @@ class LidOptions:
     most_mm         how far a margin may be moved to lie on the ball; what is farther is an odd scan, left as it is
     reach_mm        how far a margin's move is felt
     rounds          rounds of pushing out what still lies inside the ball
+    most_shift_mm   how far an iris that the scan shows may move the ball sideways and up
     """
 
     gap_mm: float = 0.15
@@ -33,6 +34,7 @@ class LidOptions:
     most_mm: float = 1.6
     reach_mm: float = 6.0
     rounds: int = 4
+    most_shift_mm: float = 2.0
 
 
 def eye_radius(template, vertices, lines):
@@ -45,11 +47,13 @@ def eye_radius(template, vertices, lines):
     return float(np.clip(EYE_RADIUS_MM * distance[1] / distance[0], *RADIUS_LIMITS_MM))
 
 
-def place_eyeball(template, vertices, lines, side, radius, options=None):
+def place_eyeball(template, vertices, lines, side, radius, options=None, seen=None):
     """The Eyeball of one side behind a person's lids.
 
     Sideways and up it stands to the middle of the margins as the template's does; its depth makes the median gap of
     the margins, corners apart, options.gap_mm. vertices (n, 3) of the person, lines as in Face, radius mm
+    seen  (2,) x, y of the iris on the scan: the ball moves so that its own lies there, most_shift_mm at most: what is
+          more is a look to the side
     """
     options = options or LidOptions()
     own = measure_eyeball(template, side)
@@ -57,6 +61,9 @@ def place_eyeball(template, vertices, lines, side, radius, options=None):
     there, _ = _margin(template.vertices, template.lines, side)
     margin, inner = _margin(vertices, lines, side)
     center = margin.mean(axis=0) + scale * (own.center - there.mean(axis=0))
+    if seen is not None:
+        pupil = center + radius * own.axis
+        center[:2] += np.clip(seen - pupil[:2], -options.most_shift_mm, options.most_shift_mm)
     ball = replace(own, center=center, radius=radius, radii=own.radii * scale)
     depth = _depths(ball, margin[inner], options.gap_mm)
     return replace(ball, center=center + [0.0, 0.0, np.median(depth)])

@@ -13,6 +13,8 @@ from facewright.mesh.closest import Surface
 from facewright.mesh.raster import RayScene
 from facewright.parts.eyes import LidOptions, eye_radius, fit_lids, moved_to, place_eyeball
 from facewright.solve.procrustes import best_similarity
+from facewright.transfer.eyeball import carried_eyeball
+from facewright.transfer.riders import LidRiders
 
 _MOUTH_REACH_MM = 18.0  # skin this near to the teeth says where they belong
 _JOINT_REACH_MM = 35.0
@@ -36,29 +38,41 @@ class PartOptions:
     show_share: float = 0.01
 
 
-def fit_parts(face, options=None):
+def fit_parts(face, options=None, irises=None):
     """The Face with every part in its place: eyes and lids first, then teeth and tongue, then what hangs on the skin.
 
     face    data.Face; its skin decides, whatever its other vertices say
+    irises  side -> iris_scan.Iris of the eyes that the scan shows: there the rig's lie, of that colour
     returns data.Face with new vertices; stats gain "parts"
     """
     options = options or PartOptions()
     template = face.template
     V = np.array(face.vertices)
+    irises = irises or {}
     stats = {}
     radius = eye_radius(template, V, face.lines)
     for side in ("left", "right"):
-        ball = place_eyeball(template, V, face.lines, side, radius, options.lids)
+        seen = irises[side].center if side in irises else None
+        ball = place_eyeball(template, V, face.lines, side, radius, options.lids, seen)
         V, lids = fit_lids(template, V, face.regions, face.lines, side, ball, options.lids)
         for name, placed in moved_to(template, side, ball).items():
             V[template.part(name).vertex_slice] = placed
         stats[f"eye_{side}"] = {"radius_mm": ball.radius, "center_mm": ball.center.tolist(), **lids}
+        if side in irises:
+            pupil = ball.center + ball.radius * ball.axis
+            stats[f"eye_{side}"]["iris_off_mm"] = float(np.linalg.norm(irises[side].center - pupil[:2]))
+    if irises:
+        stats["iris_color"] = np.mean([iris.color for iris in irises.values()], axis=0).tolist()
     mouth = [part for part in template.parts if part.attach in ("skull", "jaw")]
     if mouth:
         V, stats["mouth"] = _fit_mouth(template, V, face.lines, mouth, options)
     for part in template.parts[1:]:
         if part.attach == "skin":
             V[part.vertex_slice] = _carried(template, V, part)
+    for side in ("left", "right"):
+        riders = LidRiders(template, side)
+        if len(riders.index):
+            V[riders.index] = riders.placed(V, carried_eyeball(template, V, side))
     return replace(face, vertices=V, stats=face.stats | {"parts": stats})
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from facewright.parts.paint_lids import paint_blend, paint_lashes, paint_occlusion
+
 _IVORY, _NECK, _EDGE = (0.905, 0.865, 0.785), (0.84, 0.75, 0.62), (0.85, 0.845, 0.82)
 _GUM, _MARGIN, _FOLD = (0.78, 0.49, 0.47), (0.83, 0.58, 0.55), (0.66, 0.29, 0.30)
 _TONGUE, _COAT, _BENEATH = (0.76, 0.43, 0.43), (0.80, 0.58, 0.56), (0.66, 0.31, 0.33)
@@ -79,7 +81,14 @@ def paint_tongue(look, size=512):
     return _image(color * shade[..., None])
 
 
-PAINTERS = {"teeth": paint_teeth, "gums": paint_gums, "tongue": paint_tongue}
+PAINTERS = {
+    "teeth": paint_teeth,
+    "gums": paint_gums,
+    "tongue": paint_tongue,
+    "lashes": paint_lashes,
+    "occlusion": paint_occlusion,
+    "blend": paint_blend,
+}
 
 
 def _grid(size):

@@ -68,7 +68,7 @@ def measure_eyeball(template, side):
     axis = (bulge**2) @ (offset / distance[:, None])
     axis = axis / np.linalg.norm(axis) if bulge.max() > _LEAST_BULGE * radius else np.array([0.0, 0.0, 1.0])
     angle = angle_from(axis, offset)
-    edges = np.radians(np.arange(0, 181, 3))
+    edges = np.radians(np.arange(0, 181, 3) - 1e-3)  # rings of vertices at whole degrees must not lie on an edge
     bins = np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2)
     outermost = np.zeros(len(edges) - 1)
     np.maximum.at(outermost, bins, distance)

@@ -14,6 +14,7 @@ import numpy as np
 from facewright.solve.procrustes import best_rotation, best_similarity
 from facewright.transfer.deformation import DeformationTransfer, Links
 from facewright.transfer.lids import ContactOptions, clear_lids
+from facewright.transfer.riders import ride_on_lids
 from facewright.transfer.strength import line_strengths
 
 CORRECTIVE_BASE = {"mouthClose": "jawOpen"}
@@ -63,7 +64,7 @@ def transfer_shapes(face, options=None):
     if options.contact is not None:
         result = clear_lids(face, result, options.contact)
     _carry_the_rest(template, V, skin.rotation, result)
-    return result
+    return ride_on_lids(face, result, template.shape_names)
 
 
 def _strengths(face, rotation, carried):

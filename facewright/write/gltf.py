@@ -60,7 +60,7 @@ def gltf_bytes(rig, options=GltfOptions()):
     textures = {name: document.add_image(name, *_encode(rig, name, options)) for name in _used_maps(rig)}
     joints = document.add_skeleton(rig.skeleton)
     for mesh in rig.meshes:
-        material = document.add_material(mesh.material, textures)
+        material = document.add_material(mesh.material, textures, _see_through(rig, mesh.material))
         primitive = split_at_seams(mesh, tangents=options.tangents and mesh.material.normal is not None)
         document.add_mesh(mesh.name, primitive, material, joints, rig.target_names)
     document.add_scene_extras(_how_to_play(rig))
@@ -185,6 +185,11 @@ def _four_weights(skin_weights):
     return joints, weights
 
 
+def _see_through(rig, material):
+    """Whether a Material lets through what lies behind: as a whole or by its texture's alpha."""
+    return material.alpha < 1.0 or (material.albedo is not None and rig.maps[material.albedo].shape[2:] == (4,))
+
+
 def _used_maps(rig):
     """Names of the maps that materials use, each once, in the order of the meshes."""
     names = [name for mesh in rig.meshes for name in (mesh.material.albedo, mesh.material.normal) if name]
@@ -244,8 +249,11 @@ class _Document:
             self._append("samplers", {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071})
         return self._append("textures", {"name": name, "sampler": 0, "source": image})
 
-    def add_material(self, material, textures):
-        """Index of a Material; textures maps names of maps to textures."""
+    def add_material(self, material, textures, see_through):
+        """Index of a Material; textures maps names of maps to textures.
+
+        Lashes and soft strips are blended: a mask would cut their fine ends off.
+        """
         surface = {
             "baseColorFactor": [*(float(c) for c in material.color), float(material.alpha)],
             "metallicFactor": 0.0,
@@ -256,7 +264,7 @@ class _Document:
         entry = {"name": material.name, "pbrMetallicRoughness": surface}
         if material.normal:
             entry["normalTexture"] = {"index": textures[material.normal]}
-        if material.alpha < 1.0:
+        if see_through:
             entry["alphaMode"] = "BLEND"
         if material.double_sided:
             entry["doubleSided"] = True

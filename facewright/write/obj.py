@@ -68,6 +68,8 @@ def _materials(rig):
         text.append(f"d {material.alpha:.3f}")
         if material.albedo:
             text.append(f"map_Kd {file_name(material.albedo)}.png")
+            if rig.maps[material.albedo].shape[2:] == (4,):
+                text.append(f"map_d {file_name(material.albedo)}.png")
         if material.normal:
             text.append(f"norm {file_name(material.normal)}.png")
     return "\n".join(text) + "\n"

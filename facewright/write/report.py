@@ -44,6 +44,7 @@ def build_report(scan, face, rig, clean_stats, pose_info):
         "pose": pose_info,
         "registration": registration,
         "neutral": neutral_changes(face),
+        "parts": face.stats.get("parts", {}),
         "eyes_closed_on_scan": face.eyes_closed,
         "expression_removed": face.expression,
         "expression_found": face.stats["expression_found"],

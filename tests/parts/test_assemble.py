@@ -1,5 +1,7 @@
 """The Rig has what the face has: a mesh per part, targets where something moves, eyes that look like eyes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,7 +65,9 @@ def test_only_the_skin_takes_the_skins_maps(rig):
     skin = rig.meshes[0].material
     assert skin.albedo == "albedo" and skin.normal is None and skin.color == (1.0, 1.0, 1.0)
     assert "coverage" not in rig.maps
-    assert all(mesh.material.albedo not in ("albedo", None) for mesh in rig.meshes[1:])
+    assert all(mesh.material.albedo != "albedo" for mesh in rig.meshes[1:])
+    painted = {mesh.name for mesh in rig.meshes if mesh.material.albedo}
+    assert {"eye_left", "teeth_upper", "tongue", "gums_lower", "lashes_right"} <= painted
     assert {name for mesh in rig.meshes for name in (mesh.material.albedo, mesh.material.normal) if name} <= set(
         rig.maps
     )
@@ -81,10 +85,12 @@ def test_info_names_its_sources(hm08, rig):
 
 
 def test_parts_can_be_left_out_and_eyes_plain(hm08, person):
-    rig = build_rig(person, hm08.deltas, options=AssemblyOptions(eyes=None, left_out=("eye_left", "teeth")))
-    names = [mesh.name for mesh in rig.meshes]
-    assert "eye_left" not in names and "eye_right" in names and "teeth_upper" in names  # painted parts stay
+    rig = build_rig(person, hm08.deltas, options=AssemblyOptions(eyes=None, left_out=("lashes",)))
+    assert "lashes_left" in [mesh.name for mesh in rig.meshes]  # it rides on the lid and stays
     assert not any(name.startswith("eye") for name in rig.maps)
+    hanging = tuple(replace(p, attach="skin") if p.name == "lashes_left" else p for p in hm08.parts)
+    rig = build_rig(replace(person, template=replace(hm08, parts=hanging)), hm08.deltas)
+    assert "lashes_left" not in [mesh.name for mesh in rig.meshes]
 
 
 def test_an_eye_has_pupil_iris_and_white():

@@ -33,7 +33,10 @@ def template_face(template):
 
 
 def test_onto_the_template_itself_is_exact(hm08):
-    assert np.abs(transfer_shapes(template_face(hm08)) - hm08.deltas).max() < 1e-8
+    off = np.abs(transfer_shapes(template_face(hm08)) - hm08.deltas).max(axis=(0, 2))
+    riding = np.concatenate([np.arange(*part.vertices) for part in hm08.parts if part.attach.startswith("lid_")])
+    assert off[riding].max() < 0.01  # made anew from the skin, whose stored deltas are rounded
+    assert np.delete(off, riding).max() < 1e-8
 
 
 def test_rigid_motion_of_the_person_commutes(person, shapes):

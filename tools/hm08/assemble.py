@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from facewright.conventions import ARKIT_SHAPES, mirrored_name
-from facewright.data import Part, Template
+from facewright.data import Face, Part, Template
+from facewright.mesh.closest import Surface
 from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.openness import vertex_openness
 from facewright.mesh.polygons import triangulated
 from facewright.template.landmarks import template_landmarks
 from facewright.template.modifiers import Modifiers, build_modes, mean_weights
+from facewright.template.rules import symmetric_shapes
+from facewright.transfer.riders import ride_on_lids
 from hm08.carry import Carrier
 from hm08.control import build_control
 from hm08.head import build_head
+from hm08.lids import lid_pieces
 from hm08.mouth import deepen_fold
 from hm08.parts import Piece, control_points, eye_pair, mouth_pieces, mouth_rows
 from hm08.regions import EAR_TARGETS, skin_regions
@@ -37,6 +41,11 @@ MATERIALS = {
     "teeth": {"color": (0.76, 0.70, 0.58), "roughness": 0.18, "alpha": 1.0, "paint": "teeth", "cells": CELLS},
     "tongue": {"color": (0.50, 0.19, 0.18), "roughness": 0.34, "alpha": 1.0, "paint": "tongue"},
     "gums": {"color": (0.52, 0.20, 0.19), "roughness": 0.28, "alpha": 1.0, "paint": "gums", "double_sided": True},
+    "lashes": {"color": (0.02, 0.015, 0.012), "roughness": 0.7, "alpha": 1.0, "paint": "lashes", "double_sided": True},
+    "caruncle": {"color": (0.56, 0.26, 0.23), "roughness": 0.16, "alpha": 1.0},
+    "lacrimal": {"color": (0.95, 0.88, 0.86), "roughness": 0.04, "alpha": 0.22, "double_sided": True},
+    "occlusion": {"color": (0.02, 0.01, 0.01), "roughness": 1.0, "alpha": 1.0, "paint": "occlusion"},
+    "blend": {"color": (0.45, 0.2, 0.17), "roughness": 0.6, "alpha": 1.0, "paint": "blend"},
 }
 INFO = {
     "name": "hm08",
@@ -144,7 +153,7 @@ def _assemble(head, uv, uv_polygons):
         vertices, polygons, eye_uv = eyes[name]
         assembly.add(Piece(name, vertices, polygons, eye_uv, polygons, np.arange(k) + side * k, "eye", name))
     pieces, tongue_out = mouth_pieces()
-    for piece in pieces:
+    for piece in [*pieces, *lid_pieces(head.V, head.F, head.lines, head.eye_center)]:
         assembly.add(piece)
     return assembly, tongue_out
 
@@ -204,6 +213,12 @@ def _operator(control, head, assembly):
     blocks = [sp.hstack([head.S, sp.csr_matrix((len(head.V), c - control.n_skin + 2))])]
     for part, vertices in zip(assembly.parts[1:], assembly.vertices[1:]):
         k = len(vertices)
+        if part.attach.startswith("lid_"):
+            near = Surface(head.V, head.F).closest(vertices)
+            at = (np.repeat(np.arange(k), 3), head.F[near.faces].ravel())
+            rows = sp.csr_matrix((near.barycentric.ravel(), at), shape=(k, len(head.V))) @ head.S
+            blocks.append(sp.hstack([rows, sp.csr_matrix((k, c - control.n_skin + 2))]))
+            continue
         columns, weights = np.array([c + (part.name == "eye_right")]), np.ones((k, 1))
         if part.attach in ("skull", "jaw"):
             columns, weights = mouth_rows(control, vertices)
@@ -228,10 +243,15 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
     weights[:n_skin] = skin_weights(head, regions, deltas[ARKIT_SHAPES.index("jawOpen"), :n_skin], *jaw)
     column = {"skull": 1, "jaw": 2, "eye_left": 3, "eye_right": 4}
     for part in assembly.parts[1:]:
-        weights[part.vertex_slice, column[part.attach]] = 1.0
+        weights[part.vertex_slice, column.get(part.attach, 1)] = 1.0
     mirror = np.concatenate(assembly.mirror)
-    openness = vertex_openness(vertices, faces)
-    return Template(
+    # Lashes and the like cast no shadow and are not in the landmarks' pictures.
+    solid = tuple(part for part in assembly.parts if not part.attach.startswith("lid_"))
+    n_solid, f_solid = solid[-1].vertices[1], solid[-1].faces[1]
+    openness = np.ones(n)
+    openness[:n_solid] = vertex_openness(vertices[:n_solid], faces[:f_solid])
+    landmarks = template_landmarks(vertices[:n_solid], faces[:f_solid], mirror[:n_solid], solid)
+    template = Template(
         vertices=vertices,
         faces=faces,
         polygons=np.concatenate(assembly.polygons),
@@ -242,7 +262,7 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
         parts=tuple(assembly.parts),
         regions={name: np.concatenate([mask, np.zeros(n - n_skin, bool)]) for name, mask in regions.items()},
         lines=head.lines,
-        landmarks=template_landmarks(vertices, faces, mirror, tuple(assembly.parts)),
+        landmarks=landmarks,
         shape_names=ARKIT_SHAPES,
         deltas=deltas,
         identity_basis=np.stack([operator @ mode for mode in modes]),
@@ -252,3 +272,12 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
         materials=MATERIALS,
         info=INFO,
     )
+    deltas = ride_on_lids(_as_face(template), deltas, list(ARKIT_SHAPES))
+    return replace(template, deltas=symmetric_shapes(ARKIT_SHAPES, deltas, mirror))
+
+
+def _as_face(template):
+    """The template as a Face of itself."""
+    V, seen = template.vertices, np.ones(len(template.vertices), bool)
+    closed = {"left": False, "right": False}
+    return Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})

@@ -23,6 +23,7 @@ ROWS = (
     (1.0, 0.8, "inner", 0.9),
     (5.5, 1.2, "inner", 0.2),
 )
+LOWER_SHARE = 0.6  # the lower band is lower: the chin has little flesh before it
 VAULT = (0.45, 1.0)  # shares of the way from the inner gum to the midline, upper jaw
 VAULT_MM = 9.0
 FLOOR = ((12.0, 3.0),)  # lower jaw: a further row down the inner side, mm towards the root and off the teeth
@@ -48,12 +49,12 @@ def gum_band(jaw):
 
 def _left_columns(jaw):
     """(rows, columns, 3) of the left half, from the midline to behind the last molar."""
-    pieces = []
+    pieces, short = [], 1.0 if jaw.up > 0 else LOWER_SHARE
     for number, tooth in enumerate(jaw.teeth):
         count = PER_TOOTH[0 if tooth.front else 1]
         steps = np.arange(count + (number == len(jaw.teeth) - 1)) / count
         x = (2 * steps - 1) * tooth.width / 2
-        outer = np.stack([_row(jaw, number, x, row) for row in ROWS])
+        outer = np.stack([_row(jaw, number, x, (row[0] * short, *row[1:])) for row in ROWS])
         pieces.append(outer)
     rows = _smoothed(np.concatenate(pieces, axis=1))
     _, tangents, _ = arch_frames(jaw)
