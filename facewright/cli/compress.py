@@ -64,6 +64,7 @@ def run(options):
     priority = None if options.priority is None else 1 + 9 * read_mask(options.priority, neutral.shape[:2])
     examples = None if options.examples is None else read_examples(options.examples, names)
     chosen = FacezipOptions(options.method, options.textures, options.masks, budget=budget)
+    progress = None if options.quiet else Progress()
     reader = _Reader(sources, mesh, options.align)
     output = OutputFolder(options.out)
     output.make()
@@ -76,7 +77,7 @@ def run(options):
             priority=priority,
             keep=options.keep,
             options=chosen,
-            progress=None if options.quiet else Progress(),
+            progress=progress,
         )
         results = packed
         if examples is not None:
@@ -84,7 +85,7 @@ def run(options):
         with publishing(options.out) as folder:
             ktx2, missing = choose_ktx2(options.ktx2)
             started = time.perf_counter()
-            about = write_packed(results, folder, ktx2)
+            about = write_packed(results, folder, ktx2, progress)
             written = time.perf_counter()
             notes = [missing, *write_previews(results, folder, reader, names, examples)]
     except BaseException:
@@ -127,20 +128,18 @@ def parse_size(text):
 
 def write_previews(packed, folder, reader, names, examples):
     """preview.html of the first map, preview_NAME.html of the others; returns sentences on what is left out."""
-    import numpy as np
-
     from facewright.compress.folder import cannot_write
     from facewright.compress.preview import preview_missing, preview_page
     from facewright.write.files import file_name
 
     notes = []
-    mix = None if examples is None else np.linalg.pinv(examples[1])
+    B = None if examples is None else examples[1]
     for number, (name, one) in enumerate(packed.items()):
         missing = preview_missing(one)
         if missing:
             notes.append(missing)
             continue
-        page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", mix=mix)
+        page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", examples=B)
         try:
             (folder / ("preview.html" if number == 0 else f"preview_{file_name(name)}.html")).write_text(
                 page, encoding="utf-8"
@@ -163,6 +162,8 @@ def print_summary(packed, about, reader, examples, results):
         worst = max(rmse, key=rmse.__getitem__)
         print(f"{name}: {len(one.textures)} difference textures, {sum(report['seconds'].values()):.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
+        if report["solution"] == "exact":
+            print(f"{name}: exact but for the rounding of the stored step, at most {one.texture_step.max():.3f} of 255")
         if "mean_rmse_shared" in report:
             pair = (
                 f"RMSE {report['mean_rmse_shared']:.2f} with shared weights, {report['mean_rmse_alone']:.2f} with own"

@@ -98,7 +98,7 @@ def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest
     if options.budget is not None:
         images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
         k = textures_within(options.budget, images, len(names), options.textures)
-        options = replace(options, textures=k, budget=None)
+        options = replace(options, textures=k)
     if len(maps) == 1 or share is False:
         return {
             name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
@@ -127,8 +127,8 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
     scale = _texel_scale(next(iter(neutrals.values())), mesh, covered, priority)
     stack = _stacked(list(neutrals.values()))
     levels = [np.iinfo(image.dtype).max for image in neutrals.values() for _ in range(image.shape[2])]
-    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as path:
-        tiles = TextureTiles(stack, len(names), scale, path, levels)
+    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as scratch:
+        tiles = TextureTiles(stack, len(names), scale, scratch, levels)
         layers = _read(tiles, maps, neutrals, names, clock, progress)
         if len(maps) > 1:
             with clock.stage("solving"):
@@ -145,7 +145,12 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
         plain = priority is None and len(maps) == 1
         with clock.stage("solving"):
             encoded, errors = _encode(tiles, k, options, mesh, region, held, plain, progress)
-    report = {"method": options.method, "textures": k, **encoded.pop("report"), "seconds": clock.seconds}
+    report = {
+        "method": options.method,
+        "textures": len(encoded["textures"]),
+        **encoded.pop("report"),
+        "seconds": clock.seconds,
+    }
     report["covered_texels"] = int((scale > 0).sum())
     return _split(encoded, errors, neutrals, names, np.array(layers), report)
 
@@ -270,7 +275,7 @@ def _encode(tiles, k, options, mesh, region, held, plain, progress):
         return result, measure_tiles(tiles, result)
     exact = _exact_basis(tiles, gram, k, held)
     if exact is not None:
-        result = store_solution(tiles, exact, k, exact=True, report={"solution": "exact"})
+        result = store_solution(tiles, exact, exact.shape[3], exact=True, report={"solution": "exact"})
         return result, measure_tiles(tiles, result)
     start = pca_weights(gram, k)
     if held:
@@ -317,9 +322,8 @@ def _exact_basis(tiles, gram, k, held):
     texels = max(float((tiles.scale > 0).sum()) * tiles.channels, 1.0)
     if n > k and np.sqrt(max(np.diag(rest).max(), 0) / texels) > 0.6 * tiles.unit:
         return None
-    weights = np.zeros((n, k))
+    weights = np.zeros((n, max(len(chosen), 1)))  # no more difference textures than it takes
     if chosen:
-        solved = np.linalg.lstsq(gram[np.ix_(chosen, chosen)], gram[chosen], rcond=1e-12)[0].T
-        solved[chosen] = np.eye(len(chosen))
-        weights[:, : len(chosen)] = solved
-    return np.broadcast_to(weights, (*tiles.grid.cells, n, k))
+        weights[:] = np.linalg.lstsq(gram[np.ix_(chosen, chosen)], gram[chosen], rcond=1e-12)[0].T
+        weights[chosen] = np.eye(len(chosen))
+    return np.broadcast_to(weights, (*tiles.grid.cells, *weights.shape))

@@ -17,6 +17,7 @@ from facewright.compress.files import read_texture
 from facewright.compress.ktx2 import encoder_missing, raw_ktx2, texture_ktx2
 from facewright.compress.packed import Packed
 from facewright.compress.runtime import GLSL, HLSL
+from facewright.compress.threads import in_threads
 from facewright.errors import InputError
 from facewright.write.files import file_name
 
@@ -28,16 +29,17 @@ LARGEST_SIDE = 16384
 PNG_LEVEL = 1
 
 
-def write_packed(packed, folder, ktx2=None):
+def write_packed(packed, folder, ktx2=None, progress=None):
     """Write a Packed, or a dict name -> Packed of several maps, into an existing folder.
 
     ktx2     "bc7", "astc" or None: block-compressed images beside the PNG
+    progress function (stage, share done)
     returns  facezip.json as a dict
     """
     folder = Path(folder)
     maps = packed if isinstance(packed, dict) else {"color": packed}
     about = {"format": FORMAT, **_shared(next(iter(maps.values())))}
-    store, first = _Store(folder, ktx2), None
+    store, first = _Store(folder, ktx2, sum(len(one.textures) + 2 for one in maps.values()), progress), None
     about["maps"] = {}
     for number, (name, one) in enumerate(maps.items()):
         prefix = "" if number == 0 else file_name(name) + "_"
@@ -47,6 +49,7 @@ def write_packed(packed, folder, ktx2=None):
         elif one.weights is not first.weights:
             entry["weights"] = _write_weights(store, one, prefix)
         about["maps"][name] = entry
+    store.flush()
     about["bytes"] = store.totals()
     store.text("facezip.glsl", GLSL)
     store.text("facezip.hlsl", HLSL)
@@ -126,18 +129,15 @@ def weight_atlas(packed, start=0):
 class _Store:
     """Writes the files of a folder and adds up their bytes."""
 
-    def __init__(self, folder, ktx2):
-        self.folder, self.ktx2 = folder, ktx2
+    def __init__(self, folder, ktx2, count, progress):
+        self.folder, self.ktx2, self.count, self.progress = folder, ktx2, count, progress
+        self.done = 0
         self.bytes = {"png": 0, "ktx2": 0, "memory": 0, "memory_ktx2": 0}
+        self.waiting = {}
 
     def image(self, name, pixels, raw=False):
-        """Write an image as PNG and KTX2; returns the names of the files."""
-        stream = io.BytesIO()
-        Image.fromarray(np.squeeze(pixels, 2) if pixels.shape[2] == 1 else pixels).save(
-            stream, "PNG", compress_level=PNG_LEVEL
-        )
-        self._write(f"{name}.png", stream.getbuffer())
-        self.bytes["png"] += stream.getbuffer().nbytes
+        """Write an image as KTX2, and as PNG with the next flush(); returns the names of the files."""
+        self.waiting[f"{name}.png"] = pixels
         self.bytes["memory"] += pixels.nbytes
         if self.ktx2 is None:
             return {"file": f"{name}.png"}
@@ -145,7 +145,17 @@ class _Store:
         self._write(f"{name}.ktx2", data)
         self.bytes["ktx2"] += len(data)
         self.bytes["memory_ktx2"] += on_card
+        self.done += 1
+        if self.progress is not None:
+            self.progress("writing KTX2", min(self.done / self.count, 1.0))
         return {"file": f"{name}.png", "ktx2": f"{name}.ktx2", "ktx2_bytes": len(data), "ktx2_memory": on_card}
+
+    def flush(self):
+        """Write the PNG files, a few at a time."""
+        for name, data in zip(self.waiting, in_threads(_png, self.waiting.values())):
+            self._write(name, data)
+            self.bytes["png"] += len(data)
+        self.waiting = {}
 
     def totals(self):
         """Bytes on disk and on the card; what was not written is left out."""
@@ -160,6 +170,14 @@ class _Store:
             (self.folder / name).write_bytes(data)
         except OSError as error:
             raise cannot_write(self.folder, error) from error
+
+
+def _png(pixels):
+    stream = io.BytesIO()
+    Image.fromarray(np.squeeze(pixels, 2) if pixels.shape[2] == 1 else pixels).save(
+        stream, "PNG", compress_level=PNG_LEVEL
+    )
+    return stream.getvalue()
 
 
 def cannot_write(folder, error):

@@ -29,12 +29,11 @@ def preview_missing(packed):
     return ""
 
 
-def preview_page(packed, fetch, count, *, title="FaceZip", mix=None):
+def preview_page(packed, fetch, count, *, title="FaceZip", examples=None):
     """The page as text.
 
-    fetch  function n -> (h, w, C) original texture, asked for count of them in order
-    mix    (M, count): shape m's original is the sum of these shares (example-based shapes: the naive blend of Fig. 8);
-           None where every expression has its own
+    fetch     function n -> (h, w, C) original texture, asked for count of them in order
+    examples  B (count, M) of example-based shapes (Eq. 9), whose originals are the naive blends of Fig. 8; or None
     """
     height, width = packed.neutral.shape[:2]
     factor = 1
@@ -43,14 +42,14 @@ def preview_page(packed, fetch, count, *, title="FaceZip", mix=None):
     rows, columns = packed.weights.shape[1:3]
     across, _ = atlas_shape(*packed.weights.shape[:3])
     wide = np.iinfo(packed.neutral.dtype).max / 255  # 16 bits are shown in 8
-    shares = np.eye(count) if mix is None else np.asarray(mix)
+    shares = np.eye(count) if examples is None else np.linalg.pinv(examples)
     channels = packed.neutral.shape[2]
     about = f"{len(packed.names)} expressions, {packed.memory_bytes() / 1e6:.1f} MB in memory uncompressed"
     about += f", shown at 1/{factor} of {width} x {height}" if factor > 1 else f", {width} x {height}"
     data = {
         "title": title,
         "about": about + (", 8 of 16 bits" if wide > 1 else ""),
-        "originalName": "Original" if mix is None else "Blend of whole textures",
+        "originalName": "Original" if examples is None else "Blend of whole textures",
         "size": [width // factor, height // factor],
         "opaque": channels != 4,
         "names": list(packed.names),

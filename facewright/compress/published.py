@@ -7,12 +7,13 @@ permutation cost (Eq. 3-4) those of the centroids under two masks, and both are 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import permutations
 
 import numpy as np
 
 from facewright.compress.masks import build_masks
-from facewright.compress.refine import Pass, gram_matrix
+from facewright.compress.refine import Pass
 from facewright.compress.store import measure_tiles, quantise_textures, quantise_weights, root_mean, stored_parts
 from facewright.compress.threads import in_threads
 from facewright.compress.tiles import TEXELS
@@ -22,28 +23,36 @@ MOST_BLOCKS = 64
 MASK_CHOICES = (13, 33, 53, 83)
 
 
-def coarse_grams(tiles, grams, masks):
-    """Grams and mask values on at most 64 x 64 blocks: (b, N, N) float32 and (b, k)."""
+def coarse_grams(tiles, masks):
+    """Grams and mask values on at most 64 x 64 blocks of tiles: (b, N, N) float32 and (b, k)."""
     rows, columns = tiles.grid.tiles
     corner = masks.reshape(-1, masks.shape[2])[tiles.grid.corner_cells()].mean(axis=1)
+    corner = corner.reshape(rows, columns, -1)
     step = max(1, -(-max(rows, columns) // MOST_BLOCKS))
-    by, bx = np.arange(rows) // step, np.arange(columns) // step
-    block = (by[:, None] * (bx[-1] + 1) + bx[None]).ravel()
-    order = np.argsort(block, kind="stable")
-    starts = np.flatnonzero(np.diff(block[order], prepend=-1))
-    sums = np.add.reduceat(grams[order], starts, axis=0)
-    counts = np.diff(np.append(starts, len(block)))
-    means = np.add.reduceat(corner[order], starts, axis=0) / counts[:, None]
-    return sums, means.astype(np.float32)
+    starts = np.arange(0, columns, step)
+
+    def one(top):
+        """The blocks of some rows of tiles: no two calls add to the same block, so the sums come out the same."""
+        below = min(top + step, rows)
+        grams = np.zeros((len(starts), tiles.count, tiles.count), np.float32)
+        for row in range(top, below):
+            x = tiles.differences(slice(row * columns, (row + 1) * columns))
+            grams += np.add.reduceat(x @ x.transpose(0, 2, 1), starts, axis=0)
+        values = np.add.reduceat(corner[top:below].sum(axis=0), starts, axis=0)
+        counts = (below - top) * np.diff(np.append(starts, columns))
+        return grams, (values / counts[:, None]).astype(np.float32)
+
+    grams, values = zip(*in_threads(one, range(0, rows, step)))
+    return np.concatenate(grams), np.concatenate(values)
 
 
-def cluster_fragments(grams, k, *, restarts=20, iterations=30, seed=0):
+def cluster_fragments(grams, k, *, restarts=20, iterations=30, seed=0, progress=None):
     """(masks, N) cluster of every fragment: k-means (best of some restarts) on the masks' Gram matrices (m, N, N)."""
     m, n, _ = grams.shape
     rng = np.random.default_rng(seed)
     best, best_cost = np.zeros((m, n), int), np.full(m, np.inf)
     diagonal = np.einsum("mnn->mn", grams)
-    for _ in range(restarts):
+    for restart in range(restarts):
         # k-means++: each next centre with a probability like its squared distance to the nearest one.
         centres = rng.integers(n, size=(m, 1))
         near = _from_points(grams, diagonal, centres[:, 0])
@@ -68,6 +77,8 @@ def cluster_fragments(grams, k, *, restarts=20, iterations=30, seed=0):
         cost = np.take_along_axis(distance, labels[:, :, None], axis=2)[:, :, 0].sum(axis=1)
         better = cost < best_cost * (1 - 1e-9)
         best[better], best_cost[better] = labels[better], cost[better]
+        if progress is not None:
+            progress((restart + 1) / restarts)
     return best
 
 
@@ -151,7 +162,7 @@ class PermutationSearch:
             history.append(self.cost(states))
         return history[-1], states[history[-1].argmin()], np.array(history)
 
-    def solve(self, seed=0, chains=16, rounds=80):
+    def solve(self, seed=0, chains=16, rounds=80, progress=None):
         """The best state found: descent with kicks. A kick permutes a mask and those coupled to it alike."""
         rng = np.random.default_rng(seed)
         states = rng.integers(len(self.permutations), size=(chains, self.m))
@@ -174,6 +185,8 @@ class PermutationSearch:
                 order = cost.argsort()
                 half = chains // 2
                 states[order[chains - half :]], cost[order[chains - half :]] = states[order[:half]], cost[order[:half]]
+            if progress is not None:
+                progress((round_number + 1) / rounds)
         return states[cost.argmin()]
 
 
@@ -196,18 +209,17 @@ def best_published(tiles, k, options, mesh, region, progress):
         raise InputError("compress: --method paper computes its masks on the mesh; give one with UVs")
     counts = (options.masks,) if options.budget is None else MASK_CHOICES
     best = None
-    for step, count in enumerate(counts):
-        result = _encode_published(tiles, k, replace(options, masks=count), mesh, region)
+    for count in counts:
+        result = _encode_published(tiles, k, replace(options, masks=count), mesh, region, progress)
         errors = measure_tiles(tiles, result)
         if best is None or root_mean(errors).mean() < root_mean(best[1]).mean():
             best = result, errors
-        progress("searching", (step + 1) / len(counts))
     return best
 
 
-def _encode_published(tiles, k, options, mesh, region):
+def _encode_published(tiles, k, options, mesh, region, progress):
     masks, about = build_masks(mesh, tiles.grid, options.masks, seed=options.seed, region=region)
-    weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute)
+    weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute, progress)
     n = tiles.count
     work = Pass(tiles, k)
     flat = np.ascontiguousarray(shares).reshape(-1, n, k)
@@ -225,20 +237,20 @@ def _encode_published(tiles, k, options, mesh, region):
     return stored_parts(quantise_textures(tiles, image), stored, report)
 
 
-def published_search(tiles, masks, k, seed=0):
+def published_search(tiles, masks, k, seed=0, progress=None):
     """PermutationSearch of a set under masks (rows, columns, m), the labels and the centroids."""
-    _, grams = gram_matrix(tiles, blocks=True)
-    blocks, values = coarse_grams(tiles, grams, masks)
+    blocks, values = coarse_grams(tiles, masks)
     per_mask = np.tensordot(values.T**2, blocks, 1)
-    labels = cluster_fragments(per_mask, k, seed=seed)
+    labels = cluster_fragments(per_mask, k, seed=seed, progress=progress and partial(progress, "clustering"))
     centroids = centroid_matrix(labels, k)
     return PermutationSearch(pair_costs(blocks, values, centroids)), labels, centroids
 
 
-def published_solution(tiles, masks, k, seed=0, permute=True):
+def published_solution(tiles, masks, k, seed=0, permute=True, progress=None):
     """Weight maps, the shares that make the difference textures, and the permutation cost."""
-    search, labels, centroids = published_search(tiles, masks, k, seed)
-    state = search.solve(seed) if permute else np.zeros(len(labels), int)
+    search, labels, centroids = published_search(tiles, masks, k, seed, progress)
+    told = progress and partial(progress, "searching")
+    state = search.solve(seed, progress=told) if permute else np.zeros(len(labels), int)
     chosen = search.permutations[state]
     weights, shares = published_maps(masks, labels, centroids, chosen)
     return weights, shares, float(search.cost(state[None])[0])

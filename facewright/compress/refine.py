@@ -21,19 +21,14 @@ SMOOTH = 1e-3
 RIDGE = 0.01
 
 
-def gram_matrix(tiles, blocks=False):
-    """(N, N) inner products of all differences, or (T, N, N) those of every tile."""
-    out = np.empty((len(tiles), tiles.count, tiles.count), np.float32) if blocks else None
+def gram_matrix(tiles):
+    """(N, N) inner products of all differences."""
 
     def one(part):
         x = tiles.differences(part)
-        gram = x @ x.transpose(0, 2, 1)
-        if blocks:
-            out[part] = gram
-        return gram.sum(axis=0, dtype=np.float64)
+        return (x @ x.transpose(0, 2, 1)).sum(axis=0, dtype=np.float64)
 
-    total = sum(in_threads(one, tiles.chunks()))
-    return (total, out) if blocks else total
+    return sum(in_threads(one, tiles.chunks()))
 
 
 def pca_weights(gram, k):

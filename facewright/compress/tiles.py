@@ -10,7 +10,6 @@ from __future__ import annotations
 import tempfile
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -99,23 +98,25 @@ def _upsample_axis(values, size, axis):
 
 @contextmanager
 def scratch_file(size, limit):
-    """Path of a scratch file of so many bytes, removed in the end; None where size is within the limit."""
+    """An open scratch file of so many bytes, or None where size is within the limit.
+
+    It has no name where the system allows that, so that not even a killed process leaves it behind.
+    """
     if size <= limit:
         yield None
         return
-    with tempfile.TemporaryDirectory(prefix="facezip-") as folder:
-        path = Path(folder) / "tiles"
+    with tempfile.TemporaryFile(prefix="facezip-") as stream:
         try:
             # The space is claimed now: a full disk met while writing to mapped memory would end the process.
-            with open(path, "wb") as stream:
-                for _ in range(-(-size * 5 // 4 // CLAIM)):
-                    stream.write(bytes(CLAIM))
+            for _ in range(-(-size * 5 // 4 // CLAIM)):
+                stream.write(bytes(CLAIM))
+            stream.flush()
         except OSError as error:
             raise InputError(
-                f"compress: {size / 1e9:.0f} GB of scratch space are needed in {folder} ({error.strerror}); "
-                "free space or set TMPDIR to another disk"
+                f"compress: {size / 1e9:.0f} GB of scratch space are needed in {tempfile.gettempdir()} "
+                f"({error.strerror}); free space or set TMPDIR to another disk"
             ) from error
-        yield path
+        yield stream
 
 
 class TextureTiles:
@@ -124,7 +125,7 @@ class TextureTiles:
     neutral   (h, w, C) uint8 or uint16
     count     number of textures that put() may bring
     scale     (h, w) float32: 0 where no triangle covers the texel, else the square root of its priority
-    scratch   file to keep the tiles in instead of memory, so that memory does not grow with N
+    scratch   open file to keep the tiles in instead of memory, so that memory does not grow with N
     levels    (C,) largest code that a channel is stored with
     """
 

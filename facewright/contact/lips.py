@@ -43,7 +43,7 @@ class LipOptions:
     near_mm: float = 20.0
     smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8, 0.8, 0.8)
     reach_mm: float = 4.0
-    touch_mm: float = 0.12
+    touch_mm: float = 0.15
     gap_mm: float = 0.05
     teeth_mm: float = 0.1
     weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
@@ -63,7 +63,7 @@ class LipContact:
         self.V = vertices
         seam = np.unique(np.concatenate(seams))
         near = cKDTree(vertices[seam]).query(vertices)[0] < self.options.near_mm
-        around = faces[near[faces].all(axis=1)]
+        around = faces[near[faces].any(axis=1)]
         sides = seam_sides(vertices, around, *seams, self.options.lip_mm, split_ends=False)
         self.used, local = np.unique(around, return_inverse=True)
         self.faces = np.ascontiguousarray(local.reshape(-1, 3))
@@ -78,8 +78,7 @@ class LipContact:
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
-        free = ~border_vertices(self.faces, len(rest))
-        self.spread = SoftSpread(rest, self.faces, free, self.options.reach_mm)
+        self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm)
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)

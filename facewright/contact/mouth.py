@@ -24,7 +24,22 @@ PAIRS = (
     ("mouthFrown", "mouthPress"),
     ("mouthRollUpper", "mouthRollLower"),
     ("mouthShrugUpper", "mouthShrugLower"),
+    ("mouthDimple", "jawOpen"),
+    ("mouthStretch", "jawOpen"),
+    ("mouthUpperUp", "jawOpen"),
+    ("mouthFunnel", "jawOpen"),
+    ("mouthLeft", "jawOpen"),
+    ("mouthRight", "jawOpen"),
+    ("mouthPress", "mouthRollLower"),
+    ("mouthPress", "mouthRollUpper"),
+    ("mouthPress", "mouthShrugLower"),
+    ("mouthDimple", "mouthPress"),
+    ("mouthDimple", "mouthShrugLower"),
+    ("mouthFrown", "mouthShrugLower"),
+    ("mouthPucker", "mouthShrugLower"),
+    ("mouthRollLower", "mouthShrugLower"),
 )
+"""What people do together and what then crosses on some head of either template."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ LIP_GAP_BAR_MM = 0.3
 LIP_REACH_MM = 12.0  # along the skin from the seam, outwards and inwards: what counts as lip
 FACE_MM = 45.0  # from the seam: skin that teeth could stand out of
 MOST_MM = 8.0  # nothing crosses deeper: what seems to has met the other lip from behind
-MOVES_MM = 0.02
+MOVES_MM = 0.1  # of a lip: less brings nothing 0.3 mm into what it does not enter at rest
 _OFF_MM = 0.02  # a vertex is asked about this far in front of its own surface, so that this does not count
 SIDED = ("Left", "Right")
 

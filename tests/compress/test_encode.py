@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from facewright.compress import FacezipOptions, example_weights, facezip, facezip_decode
+from facewright.compress.masks import build_masks
+from facewright.compress.synthetic import expression_set
+from facewright.compress.tiles import Grid
 from facewright.errors import InputError
 
 
@@ -33,6 +36,7 @@ def test_one_texture_compresses_to_itself(channels, dtype):
     packed = facezip(neutral, images)
     step = packed.texture_step.max() / packed.unit
     assert np.abs(facezip_decode(packed, [1.0]).astype(int) - images[0]).max() <= 0.5 * step + 1
+    assert len(packed.textures) == 1
 
 
 def test_as_many_textures_as_expressions_reproduce_them():
@@ -91,3 +95,46 @@ def test_bad_input_is_refused():
         facezip(neutral, images, options=FacezipOptions(method="paper"))
     with pytest.raises(InputError, match="no such texture"):
         facezip(neutral, images, keep=["smile"])
+
+
+def test_a_region_of_priority_is_met_better():
+    neutral, images = make_set(14, shape=(64, 64))
+    priority = np.ones((64, 64))
+    priority[:32] = 10
+    plain, urgent = facezip(neutral, images), facezip(neutral, images, priority=priority)
+
+    def top(packed):
+        return np.mean([rmse(facezip_decode(packed, np.eye(14)[n])[:32], image[:32]) for n, image in enumerate(images)])
+
+    assert top(urgent) < 0.97 * top(plain)
+
+
+def test_masks_are_sampled_in_the_region():
+    made = expression_set(64, 6)
+    region = np.zeros((64, 64), bool)
+    region[:, :32] = True
+    about = [build_masks(made.mesh, Grid(64, 64), 12, region=r)[1] for r in (None, region)]
+    assert about[1]["radius_mm"] < 0.85 * about[0]["radius_mm"]
+
+
+@pytest.mark.parametrize(
+    "n,shape,channels,dtype",
+    [
+        (100, (24, 40), 3, np.uint8),
+        (7, (1, 9), 3, np.uint8),
+        (6, (33, 17), 1, np.uint16),
+        (9, (30, 8), 4, np.uint8),
+    ],
+)
+def test_every_size_and_depth_is_no_worse_than_pca(n, shape, channels, dtype):
+    neutral, images = make_set(n, shape=shape, channels=channels, dtype=dtype)
+    ours = facezip(neutral, images)
+    pca = facezip(neutral, images, options=FacezipOptions("pca"))
+    assert ours.report["mean_rmse"] <= pca.report["mean_rmse"] + 0.05
+
+
+def test_noise_alone_is_no_worse_than_pca():
+    rng = np.random.default_rng(0)
+    neutral, *images = rng.integers(0, 255, (13, 40, 40, 3)).astype(np.uint8)
+    pca = facezip(neutral, images, options=FacezipOptions("pca"))
+    assert facezip(neutral, images).report["mean_rmse"] <= pca.report["mean_rmse"] + 0.05

@@ -1,5 +1,7 @@
 """Tiles: cutting and joining for every size, and the constant basis against the upsampling of a weight map."""
 
+import io
+
 import numpy as np
 import pytest
 
@@ -31,8 +33,8 @@ def test_tiles_in_a_scratch_file_are_those_in_memory(tmp_path, monkeypatch):
     neutral, *textures = rng.integers(0, 255, (4, 20, 30, 3)).astype(np.uint8)
     memory = TextureTiles.of(neutral, textures, np.ones((20, 30), bool))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with scratch_file(memory.data.nbytes, 0) as path:
-        filed = TextureTiles(neutral, 3, np.ones((20, 30), np.float32), path)
+    with scratch_file(memory.data.nbytes, 0) as stream:
+        filed = TextureTiles(neutral, 3, np.ones((20, 30), np.float32), stream)
         for n, texture in enumerate(textures):
             filed.put(n, texture)
         filed.keep(2)
@@ -41,9 +43,10 @@ def test_tiles_in_a_scratch_file_are_those_in_memory(tmp_path, monkeypatch):
 
 
 def test_a_full_disk_is_one_sentence(monkeypatch):
-    def no_space(*_):
-        raise OSError(28, "No space left on device")
+    class Full(io.BytesIO):
+        def write(self, data):
+            raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("facewright.compress.tiles.open", no_space, raising=False)
+    monkeypatch.setattr("tempfile.TemporaryFile", lambda prefix: Full())
     with pytest.raises(InputError, match="No space left on device"), scratch_file(10**9, 0):
         pass

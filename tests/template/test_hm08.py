@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 
 from facewright.conventions import ARKIT_SHAPES, mirrored_name
-from facewright.evaluate.quality import (
-    folded_by_shape,
-    lip_gaps_mm,
-    self_intersections,
-    torn_edges,
-    visible_interior_mm2,
-)
+from facewright.evaluate.quality import lip_gaps_mm, self_intersections, torn_edges, visible_interior_mm2
 from facewright.evaluate.uv import measure_uv
 from facewright.mesh.adjacency import border_loops, half_edges, unique_edges
+from facewright.mesh.folds import folded_by_shape
 from facewright.template.store import SHIPPED
 
 FLIP = np.array([-1.0, 1.0, 1.0])

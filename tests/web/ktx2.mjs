@@ -1,6 +1,8 @@
-// Opens KTX2 files in three.js in headless Chromium and with ktx-parse, an independent reader.
-// node tests/web/ktx2.mjs OUT_FOLDER FILE.ktx2 ...
-// Writes FILE.json (what both say) and FILE.rgba (level 0 as three.js draws it); exit code 1 when one does not open.
+// Opens KTX2 files of a packed set in three.js in headless Chromium and with ktx-parse, an independent reader, and
+// draws a blend with the recipe of docs/compress-engines.md.
+// node tests/web/ktx2.mjs OUT_FOLDER PACKED_FOLDER WEIGHTS FILE.ktx2 ...
+// WEIGHTS is JSON, {"smile": 0.5}. Writes FILE.json (what both say), FILE.rgba (level 0 as three.js draws it) and
+// blend.png; exit code 1 when one does not open.
 import { createReadStream, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { basename, dirname, extname, join, normalize } from 'node:path';
@@ -9,17 +11,22 @@ import { chromium } from 'playwright-core';
 import { read } from '../../node_modules/three/examples/jsm/libs/ktx-parse.module.js';
 
 const here = dirname(fileURLToPath(import.meta.url));
-const [out, ...files] = process.argv.slice(2);
+const [out, packed, weights, ...files] = process.argv.slice(2);
 if (!files.length) {
-  console.error('usage: node tests/web/ktx2.mjs OUT_FOLDER FILE.ktx2 ...');
+  console.error('usage: node tests/web/ktx2.mjs OUT_FOLDER PACKED_FOLDER WEIGHTS FILE.ktx2 ...');
   process.exit(2);
 }
 mkdirSync(out, { recursive: true });
-const types = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
+const types = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm', '.json': 'application/json' };
+function locate(path) {
+  const number = /^\/file\/(\d+)$/.exec(path);
+  if (number) return files[Number(number[1])];
+  if (path.startsWith('/packed/')) return join(packed, path.slice(8));
+  return path.startsWith('/three/') ? join(here, '../../node_modules', path) : join(here, path);
+}
 const server = createServer((request, response) => {
   const path = normalize(new URL(request.url, 'http://localhost').pathname);
-  const number = /^\/file\/(\d+)$/.exec(path);
-  const local = number ? files[Number(number[1])] : path.startsWith('/three/') ? join(here, '../../node_modules', path) : join(here, path);
+  const local = locate(path);
   if (!existsSync(local)) return response.writeHead(404).end();
   response.writeHead(200, { 'content-type': types[extname(local)] ?? 'application/octet-stream' });
   createReadStream(local).pipe(response);
@@ -38,8 +45,11 @@ try {
     const missingIcon = message.location().url.endsWith('favicon.ico');
     if (['error', 'warning'].includes(message.type()) && !missingIcon && !/GPU stall/.test(message.text())) failures.push(`console: ${message.text()}`);
   });
-  await page.goto(`http://127.0.0.1:${server.address().port}/ktx2.html`);
-  await page.waitForFunction(() => document.title === 'ready', null, { timeout: 60000 });
+  const open = async (name) => {
+    await page.goto(`http://127.0.0.1:${server.address().port}/${name}`);
+    await page.waitForFunction(() => document.title === 'ready', null, { timeout: 60000 });
+  };
+  await open('ktx2.html');
   for (const [i, file] of files.entries()) {
     const { pixels, ...three } = await page.evaluate((url) => window.open2(url), `/file/${i}`);
     const container = read(new Uint8Array(readFileSync(file)));
@@ -49,6 +59,9 @@ try {
     writeFileSync(join(out, `${basename(file)}.rgba`), Buffer.from(pixels, 'base64'));
     if (three.error) failures.push(`${file}: WebGL error ${three.error}`);
   }
+  await open('engine.html');
+  const url = await page.evaluate((w) => window.show(w), JSON.parse(weights));
+  writeFileSync(join(out, 'blend.png'), Buffer.from(url.split(',')[1], 'base64'));
 } catch (error) {
   failures.push(error.message);
 } finally {

@@ -12,12 +12,14 @@ from hm08.shapes.fair import Fairing, Masks, falloff, symmetrised
 from hm08.shapes.jaw import closing
 from hm08.shapes.sketch import FLIP, Studio, left_half, read_sketches, symmetric_field
 
+LIDS_FAIR_MM, FAIR_MM = 2.5, 4.5  # waves of a face unit shorter than about this are taken for noise
 STILL_MM = (0.02, 0.10)  # motion below the first is none, above the second all
 
 
 def build_shapes(raw, control, head, regions, jaw):
     """(52, n, 3) deltas of the skin from raw (52, c_skin, 3) control deltas; jaw (R, t) its motion in jawOpen."""
-    masks, fair, nostrils = Masks(head, regions), Fairing(head), carry_nostrils(control)
+    masks, nostrils = Masks(head, regions), carry_nostrils(control)
+    lids, rest = Fairing(head, LIDS_FAIR_MM), Fairing(head, FAIR_MM)
     places, folds, sketches = read_sketches()
     studio = Studio(Canvas(head, regions, places), folds)
     raw = dict(zip(ARKIT_SHAPES, symmetrised(raw, control.mirror[: control.n_skin])))
@@ -30,6 +32,7 @@ def build_shapes(raw, control, head, regions, jaw):
         elif name == "mouthClose":
             made[name] = closing(head, made["jawOpen"], *jaw)
         elif sketch is None:
+            fair = lids if name.startswith("eye") else rest
             field = fair(head.S @ (nostrils @ raw[name])) * masks.of(name)[:, None]
             made[name] = just_closing(head, field) if name == "eyeBlinkLeft" else field
         else:

@@ -11,8 +11,6 @@ from facewright.mesh.laplacian import lumped_mass
 from facewright.solve.quadratic import Factorization
 from hm08.regions import geodesic
 
-FAIR_MM = 5.0  # waves of a delta shorter than about this are taken for noise
-FAIR_NEAR_MM = 4.0  # the same at lids and seam; much less there would fold faces
 # Full up to the first distance from lids or seam, none from the second on.
 EYE_SUPPORT_MM = (30.0, 55.0)
 BROW_SUPPORT_MM = (50.0, 72.0)
@@ -69,19 +67,11 @@ class Masks:
 
 
 class Fairing:
-    """Takes the short waves out of delta fields: least |u - d|^2 + |h^2 L u|^2.
+    """Takes the short waves out of delta fields: least |u - d|^2 + |h^2 L u|^2 with a length h in mm."""
 
-    The length h shrinks towards lids and seam, whose own lines are meant.
-    """
-
-    def __init__(self, head):
-        V, F = head.V, head.F
-        lines = [line for name, line in head.lines.items() if name.startswith(("lid_", "lip_seam"))]
-        near = geodesic(V, F, np.concatenate(lines))
-        length = FAIR_NEAR_MM + (FAIR_MM - FAIR_NEAR_MM) * np.clip(near / (3 * FAIR_MM), 0.0, 1.0)
-        scale = sp.diags(length**2 / 4)
-        self.mass = sp.diags(lumped_mass(V, F))
-        self.system = Factorization((self.mass + scale @ head.K @ scale).tocsr())
+    def __init__(self, head, length_mm):
+        self.mass = sp.diags(lumped_mass(head.V, head.F))
+        self.system = Factorization((self.mass + length_mm**4 / 16 * head.K).tocsr())
 
     def __call__(self, delta):
         return self.system.solve(self.mass @ delta)
