@@ -59,9 +59,9 @@ def registered(template, path, fresh):
         return unpack_face(dict(arrays), json.loads(info.read_text()), template)
 
 
-def rigged(face, seconds, parts_in_place=False):
+def rigged(face, seconds):
     """The Rig of a Face, as the main job makes it; adds core seconds (the clock's, when nothing else runs)."""
-    face = part_lips(face if parts_in_place else fit_parts(face))
+    face = part_lips(fit_parts(face))
     start = time.process_time()
     transfer_shapes(face)
     seconds["transfer"], start = time.process_time() - start, time.process_time()
@@ -71,24 +71,24 @@ def rigged(face, seconds, parts_in_place=False):
 
 
 def heads(template, count, only, fresh):
-    """(name, Face, whether its parts are in place) of all heads of a template."""
+    """(name, Face without its parts in place) of all heads of a template."""
     scans = {"sample": sample_path()} | {name: SCANS / file for name, file in REAL.items()}
     wanted = ["template", *scans, *(f"random-{seed:02d}" for seed in range(count))]
     for name in wanted:
         if only and name not in only:
             continue
         if name == "template":
-            yield name, unregistered(template, template.vertices), True
+            yield name, unregistered(template, template.vertices)
         elif name not in scans:
-            yield name, unregistered(template, random_identity(template, int(name[-2:]))), False
+            yield name, unregistered(template, random_identity(template, int(name[-2:])))
         elif scans[name].is_file():
-            yield name, registered(template, scans[name], fresh), False
+            yield name, registered(template, scans[name], fresh)
 
 
-def measure(template, name, face, placed, blends):
+def measure(template, name, face, blends):
     """Rows of one head, its time rows included."""
     seconds = {}
-    rig = rigged(face, seconds, placed)
+    rig = rigged(face, seconds)
     rows = [
         Row("time", "all shapes", "transfer, core s", seconds["transfer"], bar=(None, TRANSFER_BAR_S)),
         Row("time", "all shapes", "contact, core s", seconds["contact"], bar=(None, CONTACT_BAR_S)),
@@ -142,9 +142,9 @@ def main():
             print(f"template {template_name} is not here: left out")
             continue
         tables = {}
-        for name, face, placed in heads(template, options.heads, options.only, options.fresh):
+        for name, face in heads(template, options.heads, options.only, options.fresh):
             blends = -(-options.blends // options.heads) if name.startswith("random") else options.blends
-            tables[name] = measure(template, name, face, placed, blends)
+            tables[name] = measure(template, name, face, blends)
             judged = [row for row in tables[name] if row.has_bar]
             print(f"{template_name} {name}: {sum(row.met for row in judged)} of {len(judged)} bars met", flush=True)
             if options.all:

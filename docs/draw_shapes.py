@@ -19,6 +19,7 @@ from facewright.errors import InputError
 from facewright.evaluate.play import Player
 from facewright.mesh.raster import Camera
 from facewright.mesh.scene import Scene
+from facewright.parts import fit_parts
 from facewright.pipeline import rig_from_face
 from facewright.template.store import read_template
 from facewright.write.close_ups import close_up_cameras, close_up_poses, posed_rig
@@ -40,7 +41,8 @@ def template_rig(name):
         return None
     seen, closed = np.ones(len(template.vertices), bool), {"left": False, "right": False}
     V = template.vertices
-    return rig_from_face(part_lips(Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})))
+    face = Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})
+    return rig_from_face(part_lips(fit_parts(face)))
 
 
 def beside_each_other(rigs, where):

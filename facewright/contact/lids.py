@@ -23,7 +23,7 @@ from facewright.transfer.eyeball import lid_clearance
 _KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
 _CORNER_MM = 6.0  # around a canthus the field is evened out
 _LOOSE = 4  # margin points from a canthus on, itself included, that may be smoothed with a fold
-_JOININGS = 2
+_JOININGS, _FLUSHINGS = 2, 2
 _WAVES = 2  # of the closing line between the canthi
 
 
@@ -190,6 +190,7 @@ class Lids:
             across = np.stack([_along(at[ends], at[other], pose[other, i]) for i in range(3)], axis=1)
             fading = np.tile(np.linspace(0.5, 0.1, _LOOSE - 1), 2)[:, None]
             result[ends] += fading * (across - pose[ends])
+            result[ends] += 0.5 * (self._mean[ends] @ result - result[ends])
         return result
 
     def rotated(self, pose, field):
@@ -219,13 +220,16 @@ class Lids:
 
     def flush(self, pose):
         """The pose (n, 3) of closed lids with both margins equally far from the centre where they meet."""
-        at = pose @ self.axis
-        radius = np.linalg.norm(pose - self.ball.center, axis=1)
-        result = pose.copy()
-        for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
-            wanted = 0.5 * (radius[own] + _along(at[own], at[other], radius[other]))
-            offset = pose[own] - self.ball.center
-            result[own] = self.ball.center + offset * (wanted / radius[own])[:, None]
+        result = pose
+        for _ in range(_FLUSHINGS):
+            pose = result
+            at = pose @ self.axis
+            radius = np.linalg.norm(pose - self.ball.center, axis=1)
+            result = pose.copy()
+            for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
+                wanted = 0.5 * (radius[own] + _along(at[own], at[other], radius[other]))
+                offset = pose[own] - self.ball.center
+                result[own] = self.ball.center + offset * (wanted / radius[own])[:, None]
         return result
 
 

@@ -167,23 +167,24 @@ class LidDepth:
 
     def __init__(self, rig, side):
         self.skin = rig.meshes[0]
-        self.ball = eye_meshes(rig, side)[0]
+        meshes = eye_meshes(rig, side)
+        self.ball = meshes[0]
         self.center = rig.skeleton.positions[rig.skeleton.names.index(f"eye_{side}")]
         near = np.linalg.norm(self.skin.vertices - self.center, axis=1) < NEAR_MM
         self.lid = np.flatnonzero(near & rig.regions["eyes"] & ~rig.regions[f"socket_{side}"])
         self.rest = self.ball.vertices - self.center
-        self.radii = np.linalg.norm(self.rest, axis=1)
-        bulge = np.maximum(self.radii - np.median(self.radii[self.rest[:, 2] < 0]), 0.0) * (self.rest[:, 2] > 0)
-        axis = (bulge**2) @ (self.rest / self.radii[:, None])
+        whole = np.concatenate([mesh.vertices for mesh in meshes]) - self.center
+        radii = np.linalg.norm(whole, axis=1)
+        bulge = np.maximum(radii - np.median(radii[whole[:, 2] < 0]), 0.0) * (whole[:, 2] > 0)
+        axis = (bulge**2) @ (whole / radii[:, None])
         length = np.linalg.norm(axis)
         self.axis = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])
-        angle = np.arccos(np.clip(self.rest @ self.axis / self.radii, -1.0, 1.0))
-        self.edges = np.radians(np.arange(0, 181, 3))
-        bins = np.clip(np.digitize(angle, self.edges) - 1, 0, len(self.edges) - 2)
-        profile = np.zeros(len(self.edges) - 1)
-        np.maximum.at(profile, bins, self.radii)
+        angle = np.arccos(np.clip(whole @ self.axis / radii, -1.0, 1.0))
+        edges = np.radians(np.arange(0, 181, 3))
+        profile = np.zeros(len(edges) - 1)
+        np.maximum.at(profile, np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2), radii)
         seen = profile > 0
-        self.angles, self.profile = 0.5 * (self.edges[1:] + self.edges[:-1])[seen], profile[seen]
+        self.angles, self.profile = 0.5 * (edges[1:] + edges[:-1])[seen], profile[seen]
 
     def __call__(self, play, skin, weights):
         """mm; skin (n, 3) the posed skin"""
@@ -240,12 +241,13 @@ class _Eye(_Ball):
             steps = np.linalg.norm(np.diff(self.skin.vertices[line], axis=0), axis=1)
             share = np.append(0.0, np.cumsum(steps)) / steps.sum()
             inner.append(line[(share > CORNER_SHARE) & (share < 1 - CORNER_SHARE)])
-        return float(self._gap(self.skin.vertices[np.concatenate(inner)], self.ball.vertices).max())
+        rest = [mesh.vertices for mesh in self.meshes]
+        return float(self._gap(self.skin.vertices[np.concatenate(inner)], rest).max())
 
     def depth(self, play, weights):
         """mm of the deepest lid vertex inside the ball."""
-        ball = play(self.ball, self.sided(weights))
-        return max(0.0, -float(self._gap(play(self.skin, self.sided(weights), self.lid), ball).min()))
+        balls = [play(mesh, self.sided(weights)) for mesh in self.meshes]
+        return max(0.0, -float(self._gap(play(self.skin, self.sided(weights), self.lid), balls).min()))
 
     def margins(self, play, weights):
         """mm between the two margins."""
@@ -266,9 +268,11 @@ class _Eye(_Ball):
         weights = self.sided(weights)
         return play(self.skin, weights), [play(mesh, weights) for mesh in self.meshes]
 
-    def _gap(self, points, ball):
-        """(k,) signed distance of points from the ball's mesh, negative inside."""
-        found = Surface(ball, self.ball.faces).closest(points)
+    def _gap(self, points, balls):
+        """(k,) signed distance of points from the eye's meshes, cornea included, negative inside."""
+        offsets = np.cumsum([0] + [len(ball) for ball in balls])
+        faces = np.concatenate([mesh.faces + offset for mesh, offset in zip(self.meshes, offsets)])
+        found = Surface(np.concatenate(balls), faces).closest(points)
         foot = np.linalg.norm(found.points - self.center, axis=1)
         inside = np.linalg.norm(points - self.center, axis=1) < foot
         return np.where(inside, -found.distance, found.distance)

@@ -11,7 +11,7 @@ from facewright.mesh.normals import face_normals
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
 
 _PATIENCE = 5
-_AROUND = 7  # rings around folds that smoothing may reach
+_AROUND = 9  # rings around folds that smoothing may reach
 
 
 def folded_by_shape(neutral, moved, faces, mask=None):
@@ -64,7 +64,7 @@ def neighbour_mean(faces, n, lines=()):
     return (sp.diags(1.0 / np.maximum(np.asarray(W.sum(axis=1)).ravel(), 1.0)) @ W).tocsr()
 
 
-def laid_flat(neutral, moved, faces, keep, mean, *, rounds=20, step=0.5):
+def laid_flat(neutral, moved, faces, keep, mean, *, rounds=40, step=0.5):
     """Vertices (n, 3) of a pose in which folded faces are smoothed with their neighbours until none is left.
 
     keep (n,) bool: vertices that stay; mean: neighbour_mean of the mesh. A round moves each vertex of a fold by `step`

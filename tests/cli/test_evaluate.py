@@ -3,6 +3,7 @@
 import json
 
 from facewright.cli.__main__ import main
+from facewright.write.gltf import write_gltf
 from facewright.write.rig import write_rig
 
 FIGURES = {"mean": 0.1, "rms": 0.2, "p95": 0.3, "max": 0.4, "left_out": 0.0}
@@ -44,3 +45,13 @@ def test_a_result_without_a_report(small_rig, tmp_path, capsys):
     write_rig(small_rig, tmp_path / "rig")
     assert main(["evaluate", str(tmp_path)]) == 2
     assert "report.json" in capsys.readouterr().err
+
+
+def test_bars_of_any_glb(small_rig, tmp_path, capsys):
+    write_gltf(small_rig, tmp_path / "rig.glb")
+    assert main(["evaluate", "rig", str(tmp_path / "rig.glb"), "--blends", "0"]) == 0
+    printed = capsys.readouterr().out
+    assert "no regions" in printed and "folded faces" in printed and "bars met" in printed
+    assert main(["evaluate", "rig", str(tmp_path / "rig.glb"), "--blends", "0", "--json"]) == 0
+    assert {row["group"] for row in json.loads(capsys.readouterr().out)} == {"shapes", "expressions"}
+    assert main(["evaluate", "rig", str(tmp_path / "nothing")]) == 2
