@@ -11,7 +11,7 @@ from facewright.evaluate.mouth import measure_mouth, mouth_poses
 from facewright.evaluate.quality import lip_gaps_mm
 from facewright.evaluate.shapes import measure_shapes
 
-REPORT_WEIGHTS = (0.5, 1.0)  # of each shape, in report.json; `facewright evaluate rig` asks at four
+REPORT_WEIGHTS = (1.0,)  # of each shape, in report.json; `facewright evaluate rig` asks at four
 
 
 def measure_rig_distances(rig, scan, *, count=40000):

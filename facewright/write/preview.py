@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -30,6 +31,7 @@ HEAT_LIMIT_MM = 0.5
 HEAT_STOPS = np.array([(38, 52, 92), (46, 132, 140), (236, 212, 110), (206, 58, 48)], float)
 NOT_SEEN = (88, 88, 94)
 INNER_SHADE = 0.45
+CLAY_MAP_PX = 256
 
 
 def write_preview(rig, scan, face, path, jobs=2):
@@ -41,18 +43,19 @@ def write_preview(rig, scan, face, path, jobs=2):
     """
     sheet = preview_sheet(rig, scan, face, jobs)
     buffer = io.BytesIO()
-    Image.fromarray(sheet).save(buffer, "png", compress_level=6)
+    Image.fromarray(sheet).save(buffer, "png", compress_level=3)
     replace_file(path, buffer.getvalue())
 
 
 def preview_sheet(rig, scan, face, jobs=2):
     """The contact sheet as (h, w, 3) uint8."""
-    played, rig = rig, rig.plain()
+    small = replace(rig, maps={name: _at_most(image, CLAY_MAP_PX) for name, image in rig.maps.items()})
+    played, plain = small, small.plain()
     scenes = {
         "scan": Scene(scan_drawables(scan, textured=True)),
         "rig": Scene(rig_drawables(rig, textured=True)),
         "scan clay": Scene(scan_drawables(scan, textured=False)),
-        "rig clay": Scene(rig_drawables(rig, textured=False)),
+        "rig clay": Scene(rig_drawables(small, textured=False)),
         "fit": Scene([heat_drawable(scan, face)]),
     }
     wanted = [(name, view, camera) for name in scenes for view, camera in _head_cameras(rig).items()]
@@ -64,7 +67,7 @@ def preview_sheet(rig, scan, face, jobs=2):
         rendered = pool.map(lambda job: _picture(scenes[job[0]], job[2]), wanted)
         pictures = {(name, view): picture for (name, view, _), picture in zip(wanted, rendered)}
         closer = close_up_sections(played, partial(rig_drawables, textured=False), _picture, pool.map)
-        shapes = list(pool.map(lambda t: _shape_cell(rig, t, thumbnail_camera), range(-1, len(rig.target_names))))
+        shapes = list(pool.map(lambda t: _shape_cell(plain, t, thumbnail_camera), range(-1, len(plain.target_names))))
     sections = [
         _neutral_section(pictures, scan),
         _close_up_section(pictures, face),
@@ -73,8 +76,17 @@ def preview_sheet(rig, scan, face, jobs=2):
         *closer,
     ]
     triangles = sum(len(mesh.faces) for mesh in rig.meshes)
-    subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(rig.target_names)} shapes"
+    subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(plain.target_names)} shapes"
     return compose_sheet(str(rig.info.get("name", scan.name)), subtitle, sections)
+
+
+def _at_most(image, pixels):
+    """The image halved until it is no larger; clay pictures show eyes and teeth small, a hundred times over."""
+    while min(image.shape[:2]) >= 2 * pixels:
+        even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2].astype(np.uint16)
+        pairs = even[0::2] + even[1::2]
+        image = ((pairs[:, 0::2] + pairs[:, 1::2] + 2) // 4).astype(np.uint8)
+    return image
 
 
 def _picture(scene, camera):
