@@ -70,9 +70,9 @@ def register(scan, landmarks, template, options=None, placed=()):
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, LEVELS + DETAIL)
     interior, outer, led = _interior(template)
+    skin = _unfolded(template, skin, faces, matches)
     fit = model.vertices.copy()
     fit[:stop] = _without_knots(template, tuck_interior(skin, faces, interior, outer, led), faces)
-    fit[:stop] = _unfolded(template, fit[:stop], faces, matches)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
