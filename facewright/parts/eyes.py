@@ -31,7 +31,7 @@ class LidOptions:
 
     gap_mm: float = 0.15
     skin_clear_mm: float = 0.8
-    most_mm: float = 1.6
+    most_mm: float = 4.0
     reach_mm: float = 6.0
     rounds: int = 4
     most_shift_mm: float = 2.0
