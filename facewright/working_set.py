@@ -10,6 +10,9 @@ import sys
 from dataclasses import dataclass
 from importlib import resources
 
+import numpy as np
+from scipy.spatial import cKDTree
+
 if sys.version_info >= (3, 11):
     import tomllib
 else:
@@ -95,3 +98,31 @@ def _weights(weights):
         names = [name[:-1] + side for side in SIDES] if name.endswith("*") else [name]
         spelt |= dict.fromkeys(names, float(weight))
     return spelt
+
+
+def region_depth(vertices, lines, region, side, scale):
+    """(n,) how far inside a Region each vertex (n, 3) lies, mm at 63 mm between the eyes; 0 or less is outside.
+
+    lines  feature line -> vertices; side "left", "right" or None for both; scale  brings the head to 63 mm
+    """
+
+    def points(names):
+        found = [line for name in names for line in _side_lines(lines, name, side)]
+        return vertices[np.concatenate(found)]
+
+    depth = region.reach - cKDTree(points(region.around)).query(vertices)[0] * scale
+    if region.below:
+        depth = np.minimum(depth, (points(region.below)[:, 1].max() - vertices[:, 1]) * scale)
+    if region.above:
+        depth = np.minimum(depth, (vertices[:, 1] - points(region.above)[:, 1].min()) * scale)
+    if side:
+        seam = vertices[lines["lip_seam_upper"], 0]
+        past = (vertices[:, 0] - seam.mean()) * (1.0 if side == "left" else -1.0)
+        depth = np.minimum(depth, (past + 0.5 * np.ptp(seam)) * scale)
+    return depth
+
+
+def _side_lines(lines, name, side):
+    if name in lines:
+        return [lines[name]]
+    return [lines[f"{name}_{one}"] for one in ((side,) if side else ("left", "right"))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from facewright.conventions import INTERPUPILLARY_MM, mirrored_name
 from facewright.evaluate.play import Player
@@ -12,7 +11,7 @@ from facewright.evaluate.rows import Row
 from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.folds import folded_by_shape
 from facewright.mesh.intersect import self_intersections
-from facewright.working_set import read_working_set
+from facewright.working_set import read_working_set, region_depth
 
 MIRROR_X = np.array([-1.0, 1.0, 1.0])
 SWAPPED = {"jawLeft": "jawRight", "mouthLeft": "mouthRight"}
@@ -119,37 +118,12 @@ def stray_mm(rig):
             continue
         key = (word.region, word.side)
         if key not in masks:
-            masks[key] = region_mask(rig, words.regions[word.region], word.side)
+            region = words.regions[word.region]
+            masks[key] = region_depth(skin.vertices, rig.lines, region, word.side, eye_scale(rig)) > 0.0
         beyond = rig.regions["outer"] & ~masks[key]
         motion = np.linalg.norm(play(skin, {name: 1.0}) - skin.vertices, axis=1)
         result[name] = float(motion[beyond].max(initial=0.0)) * eye_scale(rig)
     return result
-
-
-def region_mask(rig, region, side=None):
-    """(n_skin,) bool: where shapes of a working_set.Region may move skin; side "left", "right" or None for both."""
-    vertices, scale = rig.meshes[0].vertices, eye_scale(rig)
-
-    def lines(names):
-        found = [line for name in names for line in _side_lines(rig.lines, name, side)]
-        return vertices[np.concatenate(found)]
-
-    mask = cKDTree(lines(region.around)).query(vertices)[0] * scale < region.reach
-    if region.below:
-        mask &= vertices[:, 1] < lines(region.below)[:, 1].max()
-    if region.above:
-        mask &= vertices[:, 1] > lines(region.above)[:, 1].min()
-    if side:
-        seam = vertices[rig.lines["lip_seam_upper"], 0]
-        past = (vertices[:, 0] - seam.mean()) * (1.0 if side == "left" else -1.0)
-        mask &= past > -0.5 * np.ptp(seam)
-    return mask
-
-
-def _side_lines(lines, name, side):
-    if name in lines:
-        return [lines[name]]
-    return [lines[f"{name}_{one}"] for one in ((side,) if side else ("left", "right"))]
 
 
 def amplitudes(rig):
