@@ -83,9 +83,10 @@ def write_landmarks(path, landmarks, scan, *, names=None):
     """Write landmarks of a scan in the coordinates of its file, to be moved by hand and given back.
 
     landmarks Landmarks on the scan's faces
-    names     which ones: landmark name -> the name to write; default all with a weight, by their own names
+    names     which ones: their names, or landmark name -> the name to write; default all with a weight
     """
     path = Path(path)
+    names = names if names is None or isinstance(names, dict) else {name: name for name in names}
     points = landmarks.positions(scan.vertices, scan.faces) @ scan.T_ours_to_scan[:3, :3].T + scan.T_ours_to_scan[:3, 3]
     table = {
         name if names is None else names[name]: [float(f"{value:.7g}") for value in point]
