@@ -41,7 +41,7 @@ class EyeShapeOptions:
     )
     wide_turn_deg: tuple[float, float] = (12.0, -4.0)
     squint_share: tuple[float, float] = (0.10, 0.30)
-    free_mm: float = 18.0
+    free_mm: float = 14.0
 
 
 def solve_eyes(face, deltas, options=None):
