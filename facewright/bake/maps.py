@@ -30,6 +30,7 @@ from facewright.mesh.render import linear_to_srgb
 from facewright.mesh.tangents import corner_tangents, to_tangent_space
 
 SEEN, FILLED, INSIDE = 255, 128, 0
+HAIR_EDGE_MM = 6.0
 SPECK_MM = 6.0
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
 
@@ -119,6 +120,10 @@ def _skin_of(face):
     outer[F[outer_faces].ravel()] = True
     FT = template.uv_faces[template.skin.face_slice]
     observed = _without_specks(face.fit[:n], F, face.observed[:n] | ~outer)
+    if "hidden" in face.regions:
+        # Where hair begins its colour already lies on the skin.
+        hidden = face.regions["hidden"][:n] & ~observed
+        observed &= surface_distance(face.fit[:n], F, hidden, HAIR_EDGE_MM) >= HAIR_EDGE_MM
     return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, observed)
 
 
