@@ -16,6 +16,16 @@ ARKIT_SHAPES = tuple(
     cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft noseSneerRight tongueOut""".split()
 )
 
+MOUTH_PAIRS = (
+    ("mouthSmile", "jawOpen"),
+    ("mouthSmile", "mouthFunnel"),
+    ("mouthFunnel", "mouthPucker"),
+    ("mouthFrown", "mouthPress"),
+    ("mouthRollUpper", "mouthRollLower"),
+    ("mouthShrugUpper", "mouthShrugLower"),
+)
+"""Pairs of shapes that lips must survive together; a name without its side stands for both sides."""
+
 INTERPUPILLARY_MM = 63.0
 """Mean adult distance between the pupils: the scale of a scan that states none, and of every benchmark figure."""
 

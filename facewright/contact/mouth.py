@@ -10,7 +10,7 @@ import numpy as np
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
-from facewright.conventions import corrective_name, in_between_name, mirrored_name
+from facewright.conventions import MOUTH_PAIRS, corrective_name, in_between_name, mirrored_name
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
 
@@ -18,12 +18,7 @@ HALF = 0.5
 _MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
 _EVEN_MM = 1e-6
 PAIRS = (
-    ("mouthSmile", "jawOpen"),
-    ("mouthSmile", "mouthFunnel"),
-    ("mouthFunnel", "mouthPucker"),
-    ("mouthFrown", "mouthPress"),
-    ("mouthRollUpper", "mouthRollLower"),
-    ("mouthShrugUpper", "mouthShrugLower"),
+    *MOUTH_PAIRS,
     ("mouthDimple", "jawOpen"),
     ("mouthStretch", "jawOpen"),
     ("mouthUpperUp", "jawOpen"),

@@ -6,6 +6,7 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.conventions import MOUTH_PAIRS
 from facewright.evaluate.quality import lip_gaps_mm
 from facewright.evaluate.rows import Row
 from facewright.expand import expand_weights
@@ -30,15 +31,7 @@ SIDED = ("Left", "Right")
 
 def mouth_pairs():
     """name -> weights of the pairs that lips must survive; shapes without their side stand for both sides."""
-    pairs = (
-        ("mouthSmile", "jawOpen"),
-        ("mouthSmile", "mouthFunnel"),
-        ("mouthFunnel", "mouthPucker"),
-        ("mouthFrown", "mouthPress"),
-        ("mouthRollUpper", "mouthRollLower"),
-        ("mouthShrugUpper", "mouthShrugLower"),
-    )
-    return {f"{a} + {b}": {a: 1.0, b: 1.0} for a, b in pairs}
+    return {f"{a} + {b}": {a: 1.0, b: 1.0} for a, b in MOUTH_PAIRS}
 
 
 def mouth_poses(rig, at=WEIGHTS):
