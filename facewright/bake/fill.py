@@ -6,7 +6,8 @@ A low-pass colour x per vertex is known where the scan shows the skin. Elsewhere
 
 where g is the mirrored colour if the other side is known at both ends, else 0: a missing cheek repeats the other one's
 shading without a step at its border, and what neither side shows is a smooth membrane (Perez, Gangnet and Blake 2003,
-on a mesh instead of an image). The mirrored side's detail is added texel by texel. Work in sRGB: steps that the eye
+on a mesh instead of an image) that forgets the rim over FORGET_MM and becomes the skin's usual colour: else one dark
+lock of hair at the rim darkens half a scalp. The mirrored side's detail is added texel by texel. Work in sRGB: steps that the eye
 sees as equal count as equal.
 """
 
@@ -24,7 +25,12 @@ from facewright.solve.quadratic import Factorization
 TRUSTED_MM = 2.0
 FEATHER_MM = 5.0
 SHOWN_SHARE = 0.5
+# Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
+# is hair.
+STAIN_MM, STAIN_STEPS, STAIN_SPREADS, STAIN_SHARE = 25.0, 20.0, 3.0, 0.5
 RIDGE = 1e-6
+FORGET_MM = 30.0
+LUMA = np.array([0.299, 0.587, 0.114])
 # Multiplies the mean skin colour (sRGB): what is found this many mm behind the rim.
 INTERIORS = {
     "mouth_interior": ((0.42, 0.20, 0.22), 6.0),
@@ -67,6 +73,30 @@ def feather(V, F, outer, share):
     distance = surface_distance(V, F, holes, FEATHER_MM)
     t = np.clip((distance - 1.0) / (FEATHER_MM - 1.0), 0.0, 1.0)
     return np.where(outer & ~holes, t * t * (3 - 2 * t), 0.0)
+
+
+def hair_stains(V, F, means, share, hidden):
+    """(n,) bool: vertices whose colour is that of the hair beside them: strands, a hairline, what shows between curls.
+
+    V (n, 3), F (m, 3) skin; means (n, 3) sRGB and share (n,) as in solve_fill; hidden (n,) bool: hair covers the skin
+    A stain hangs together with skin that is hidden or not shown, so brows and birthmarks stay.
+    """
+    shown = (share >= SHOWN_SHARE) & ~hidden
+    near = surface_distance(V, F, hidden, STAIN_MM) < STAIN_MM
+    skin = shown & ~near
+    if not (skin.any() and hidden.any()):
+        return np.zeros(len(V), bool)
+    brightness = means @ LUMA
+    usual = np.median(brightness[skin])
+    spread = 1.4826 * np.median(np.abs(brightness[skin] - usual))
+    limit = min(max(STAIN_STEPS, STAIN_SPREADS * spread), STAIN_SHARE * usual)
+    odd = shown & near & (np.abs(brightness - usual) > limit)
+    passable, reached = odd | (near & ~shown), hidden
+    while True:
+        grown = hidden | (dilate(reached, F) & passable)
+        if (grown == reached).all():
+            return reached & odd
+        reached = grown
 
 
 def solve_fill(V, F, regions, mirror, outer, means, share, default):
@@ -118,9 +148,15 @@ def _poisson(V, F, color, held, free, guide, guided, rest):
     wanted = np.where(guided[edges].all(1)[:, None], difference @ guide, 0.0)
     A = (difference.T @ sp.diags(weights) @ difference).tocsr()
     b = difference.T @ (weights[:, None] * wanted)
-    ridge = RIDGE * max(weights.mean() if len(weights) else 1.0, 1e-9)
-    system = A[free][:, free] + ridge * sp.identity(int(free.sum()))
-    right = b[free] - A[free][:, held] @ color[held] + ridge * rest
+    # On an even mesh of spacing h the edges' sum is about 1.5 h times the Laplacian.
+    spacing = np.bincount(edges.ravel(), np.repeat(length, 2), n) / np.maximum(
+        np.bincount(edges.ravel(), minlength=n), 1
+    )
+    ridge = RIDGE * max(weights.mean() if len(weights) else 1.0, 1e-9) + np.where(
+        guided, 0.0, 1.5 * spacing / FORGET_MM**2
+    )
+    system = A[free][:, free] + sp.diags(ridge[free])
+    right = b[free] - A[free][:, held] @ color[held] + ridge[free, None] * rest
     result = color.copy()
     result[free] = np.clip(Factorization(system).solve(right), 0.0, 255.0)
     return result

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facewright.bake.fill import feather, solve_fill, surface_distance
+from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
 from facewright.bake.project import project_to_scan
 from facewright.bake.pyramid import push_pull
@@ -47,7 +47,8 @@ class BakeOptions:
 
 @dataclass(frozen=True)
 class _Skin:
-    """The skin part of a face: V (n, 3) fit, F (m, 3), UV (t, 2), FT (m, 3), outer_faces (m,), observed (n,)."""
+    """The skin part of a face: V (n, 3) fit, F (m, 3), UV (t, 2), FT (m, 3), outer_faces (m,), observed (n,),
+    hair (n,): hidden by it."""
 
     V: np.ndarray
     neutral: np.ndarray
@@ -57,6 +58,7 @@ class _Skin:
     outer_faces: np.ndarray
     outer: np.ndarray
     observed: np.ndarray
+    hair: np.ndarray
 
 
 def bake(scan, face, options=None, jobs=1):
@@ -85,6 +87,7 @@ def bake(scan, face, options=None, jobs=1):
     means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, len(skin.V), jobs)
     n = len(skin.V)
     regions = {name: mask[:n] for name, mask in face.regions.items()}
+    share = np.where(hair_stains(skin.V, skin.F, means, share, skin.hair), 0.0, share)
     default = _default_skin(face.template)
     fill = solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, share, default)
 
@@ -120,11 +123,10 @@ def _skin_of(face):
     outer[F[outer_faces].ravel()] = True
     FT = template.uv_faces[template.skin.face_slice]
     observed = _without_specks(face.fit[:n], F, face.observed[:n] | ~outer)
-    if "hidden" in face.regions:
-        # Where hair begins its colour already lies on the skin.
-        hidden = face.regions["hidden"][:n] & ~observed
-        observed &= surface_distance(face.fit[:n], F, hidden, HAIR_EDGE_MM) >= HAIR_EDGE_MM
-    return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, observed)
+    hair = face.regions.get("hidden", np.zeros(n, bool))[:n] & ~observed
+    # Where hair begins its colour already lies on the skin.
+    observed &= surface_distance(face.fit[:n], F, hair, HAIR_EDGE_MM) >= HAIR_EDGE_MM
+    return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, observed, hair)
 
 
 def _without_specks(V, F, observed):

@@ -163,7 +163,9 @@ def _to_the_slit(vertices, faces, R, center, columns, height):
     prior = 0.5 * (offsets / SLIT_SIGMA_MM) ** 2
     aside = offsets[(narrow / max(np.median(found), 1e-6) - 0.35 * prior).argmax(axis=1)]
     aside *= np.clip((found - SLIT_MM[0]) / (SLIT_MM[1] - SLIT_MM[0]), 0.0, 1.0)
-    return gaussian_filter1d(median_filter(aside, round(2.0 * per_mm) | 1, mode="nearest"), 0.6 * per_mm, mode="nearest")
+    return gaussian_filter1d(
+        median_filter(aside, round(2.0 * per_mm) | 1, mode="nearest"), 0.6 * per_mm, mode="nearest"
+    )
 
 
 def _best_path(strength, offsets, options):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facewright.bake.fill import feather, solve_fill, surface_distance
+from facewright.bake.fill import FORGET_MM, feather, hair_stains, solve_fill, surface_distance
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +70,28 @@ def test_vertices_without_texels_are_no_holes(ball):
     fill = solve_fill(V, F, {}, mirror, outer, shading(V), share, (1, 2, 3))
     assert (fill.weight == 1).all()
     assert np.abs(fill.color - shading(V)).max() < 6
+
+
+def test_a_lock_at_the_hairline_is_hair_and_a_brow_is_not(ball):
+    V, F, _, _ = ball
+    hidden = V[:, 1] > 40
+    lock = (np.abs(V[:, 0]) < 12) & (V[:, 1] > 25) & ~hidden
+    brow = (np.abs(V[:, 0] - 30) < 12) & (np.abs(V[:, 1] - 20) < 6) & (V[:, 2] > 0)
+    means = np.where((hidden | lock | brow)[:, None], 30.0, 150.0) * np.ones(3)
+    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden)
+    assert lock.any() and brow.any()
+    np.testing.assert_array_equal(stains, lock)
+    assert not hair_stains(V, F, means, np.ones(len(V)), np.zeros(len(V), bool)).any(), "no hair, no stains"
+
+
+def test_far_from_the_rim_the_fill_is_the_usual_skin(ball):
+    V, F, _, _ = ball
+    outer, height = np.ones(len(V), bool), V[:, 2]
+    shown = height > -1.0
+    dark = shown & (height < 20)
+    colors = np.where(dark[:, None], 60.0, 160.0) * np.ones(3)
+    fill = solve_fill(V, F, {}, np.arange(len(V)), outer, colors, shown.astype(float), (1, 2, 3))
+    arc = 80 * np.arcsin(np.clip(-height / 80, 0, 1))
+    rim, far = ~shown & (arc < 0.3 * FORGET_MM), arc > 2.5 * FORGET_MM
+    assert fill.color[rim].mean() < 110, "no step at the rim"
+    assert np.abs(fill.color[far] - 160).max() < 15
