@@ -7,8 +7,8 @@ A low-pass colour x per vertex is known where the scan shows the skin. Elsewhere
 where g is the mirrored colour if the other side is known at both ends, else 0: a missing cheek repeats the other one's
 shading without a step at its border, and what neither side shows is a smooth membrane (Perez, Gangnet and Blake 2003,
 on a mesh instead of an image) that forgets the rim over FORGET_MM and becomes the skin's usual colour: else one dark
-lock of hair at the rim darkens half a scalp. The mirrored side's detail is added texel by texel. Work in sRGB: steps that the eye
-sees as equal count as equal.
+lock of hair at the rim darkens half a scalp. The mirrored side's detail is added texel by texel. Work in sRGB: steps
+that the eye sees as equal count as equal.
 """
 
 from __future__ import annotations
