@@ -10,7 +10,7 @@ from facewright.data import Part
 from facewright.errors import InputError
 from facewright.mesh.normals import normalized
 from facewright.mesh.polygons import polygon_centers
-from facewright.template.atlas import Chart, in_unit_square, islands_with, pack_charts, uv_islands, welded_uv
+from facewright.template.atlas import Chart, banded_uv, in_unit_square, islands_with, pack_charts, uv_islands, welded_uv
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,10 @@ def assemble(description, mesh, unit, source_shapes):
             raise InputError(f"template description: part {entry['name']!r} picks no polygon of the source")
         left &= ~mine
         charts = description.get("atlas") if entry is description["parts"][0] else None
-        pieces.append(_piece(vertices, mesh.polygons[mine], mesh.uv, mesh.uv_polygons[mine], charts))
+        piece = _piece(vertices, mesh.polygons[mine], mesh.uv, mesh.uv_polygons[mine], charts)
+        if "uv_bands" in entry:
+            piece = (*piece[:2], banded_uv(piece[2], entry["uv_bands"]), piece[3])
+        pieces.append(piece)
     return _joined(description["parts"], vertices, pieces)
 
 

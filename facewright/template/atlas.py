@@ -81,6 +81,25 @@ def _placed(uv, chart):
     return (box_low + box_high) / 2 + scale * (uv - (low + high) / 2)
 
 
+def banded_uv(uv, bands):
+    """UVs (t, 2) of a part whose rows of v are moved: each band (v0, v1, w0, w1) brings v0..v1 to w0..w1, turned over
+    where w0 > w1; u is stretched to 0..1. So a source's cards take the layout that a painted material asks for.
+
+    raises InputError if some v is in no band
+    """
+    slack = 1e-3
+    moved, free = uv.copy(), np.ones(len(uv), bool)
+    for v0, v1, w0, w1 in bands:
+        mine = free & (uv[:, 1] > v0 - slack) & (uv[:, 1] < v1 + slack)
+        moved[mine, 1] = np.clip(w0 + (uv[mine, 1] - v0) / (v1 - v0) * (w1 - w0), min(w0, w1), max(w0, w1))
+        free &= ~mine
+    if free.any():
+        raise InputError(f"template description: v = {uv[free][0, 1]:.3f} is in none of the part's uv_bands")
+    low, high = uv[:, 0].min(), uv[:, 0].max()
+    moved[:, 0] = (uv[:, 0] - low) / max(high - low, 1e-9)
+    return moved
+
+
 def welded_uv(uv, uv_polygons, polygons):
     """UVs without seams that are none: corners of one vertex at one place share one entry. (t, 2), (p, 4)."""
     real = uv_polygons >= 0

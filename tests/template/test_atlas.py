@@ -5,7 +5,15 @@ import pytest
 
 from facewright.errors import InputError
 from facewright.mesh.polygons import triangulated
-from facewright.template.atlas import Chart, in_unit_square, pack_charts, uv_islands, uv_measures, welded_uv
+from facewright.template.atlas import (
+    Chart,
+    banded_uv,
+    in_unit_square,
+    pack_charts,
+    uv_islands,
+    uv_measures,
+    welded_uv,
+)
 
 
 def two_sheets():
@@ -68,3 +76,11 @@ def test_measures_of_a_known_stretch():
     assert measures["anisotropy_median"] == pytest.approx(2)
     assert uv_measures(V, F[:, ::-1], uv, F, np.ones(2, bool))["flipped"] == 0
     assert uv_measures(V, F, uv, F[:, ::-1], np.ones(2, bool))["flipped"] == 2
+
+
+def test_bands_of_cards_take_the_layout_of_a_painted_material():
+    uv = np.array([[0.5, 0.98], [0.9, 0.84], [0.7, 0.91], [0.5, 0.32], [0.9, 0.18]])
+    bands = [(0.84, 0.98, 1.0, 0.5), (0.18, 0.32, 0.5, 0.0)]
+    np.testing.assert_allclose(banded_uv(uv, bands), [[0, 0.5], [1, 1], [0.5, 0.75], [0, 0], [1, 0.5]], atol=1e-9)
+    with pytest.raises(InputError, match="uv_bands"):
+        banded_uv(uv, bands[:1])
