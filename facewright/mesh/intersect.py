@@ -3,6 +3,8 @@
 import igl.predicates
 import numpy as np
 
+_CLUSTER_MM = 8.0  # faces asked about are looked for together with those this near
+
 
 def self_intersections(vertices, faces, mask=None):
     """(k, 2) pairs of faces that cross and share no vertex, lower index first.
@@ -19,3 +21,31 @@ def self_intersections(vertices, faces, mask=None):
     pairs = np.asarray(pairs).reshape(-1, 2)[np.asarray(coplanar).reshape(-1) == 0]
     shared = (subset[pairs[:, 0]][:, :, None] == subset[pairs[:, 1]][:, None, :]).any(axis=(1, 2))
     return np.unique(np.sort(chosen[pairs[~shared]], axis=1), axis=0)
+
+
+def intersections_of(vertices, faces, asked):
+    """As self_intersections, the pairs of which at least one face is asked (m,) bool: quick where these are few."""
+    low, high = _face_boxes(vertices, faces)
+    cells = np.floor(0.5 * (low + high)[:, asked] / _CLUSTER_MM)
+    _, cluster = np.unique(cells, axis=1, return_inverse=True)
+    near, mine = asked.copy(), np.flatnonzero(asked)
+    for number in range(cluster.max(initial=-1) + 1):
+        own = mine[cluster == number]
+        near |= _overlapping(low, high, low[:, own].min(axis=1), high[:, own].max(axis=1))
+    pairs = self_intersections(vertices, faces, near)
+    return pairs[asked[pairs].any(axis=1)]
+
+
+def _face_boxes(vertices, faces):
+    """Lower and upper corners (3, m) of the boxes around faces."""
+    a, b, c = (vertices[faces[:, i]].T for i in range(3))
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
+def _overlapping(low, high, least, most):
+    """(m,) bool: boxes (3, m) that meet the box from least (3,) to most (3,)."""
+    result = low[0] <= most[0]
+    for axis in range(3):
+        result &= low[axis] <= most[axis]
+        result &= high[axis] >= least[axis]
+    return result

@@ -3,7 +3,7 @@
 import numpy as np
 
 from facewright.mesh.adjacency import dilate, vertex_adjacency
-from facewright.mesh.intersect import self_intersections
+from facewright.mesh.intersect import intersections_of, self_intersections
 from facewright.mesh.normals import face_cross, normalized
 
 
@@ -17,13 +17,17 @@ def untangled(vertices, faces, keep, *, rounds=60):
     A = vertex_adjacency(faces, len(vertices))
     degree = np.maximum(np.asarray(A.sum(axis=1)), 1)
     near = faces[dilate(~keep, faces, 3)[faces].all(axis=1)]
+    pairs = self_intersections(moved, near)
     for _ in range(rounds):
         knot = np.zeros(len(vertices), bool)
-        knot[near[np.unique(self_intersections(moved, near))].ravel()] = True
+        knot[near[np.unique(pairs)].ravel()] = True
         knot = dilate(knot, faces) & ~keep
         if not knot.any():
             break
-        moved[knot] = 0.5 * moved[knot] + 0.5 * ((A @ moved) / degree)[knot]
+        moved[knot] = 0.5 * moved[knot] + 0.5 * (A[knot] @ moved) / degree[knot]
+        # Faces that did not move cross as before.
+        touched = knot[near].any(axis=1)
+        pairs = np.concatenate([pairs[~touched[pairs].any(axis=1)], intersections_of(moved, near, touched)])
     return moved
 
 

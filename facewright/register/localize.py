@@ -14,6 +14,8 @@ four of hm08 1.22, 1.10, 1.06, 1.06; five of ICT, cut to 20 modes, 0.76, 0.80, 0
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 WINDOWS, LENGTH_MM, SHARE, MODES = 12, 60.0, 0.05, 200
@@ -22,31 +24,60 @@ WIDE_MODES = 20
 SAMPLES, OUTSIDE_WEIGHT = 2500, 0.3
 
 
+@dataclass(frozen=True)
+class LocalizedBasis:
+    """j identity modes of a head of n vertices, one standard deviation each, as mixtures of a template's own i modes,
+    wide, and of the first w of them seen through r windows. Written out they fill 150 MB, of which little is asked for.
+
+    basis (i, n, 3) mm, windows (n, r), mixture (j, i + w r)
+    """
+
+    basis: np.ndarray
+    windows: np.ndarray
+    mixture: np.ndarray
+
+    def __len__(self):
+        return len(self.mixture)
+
+    def at(self, rows):
+        """(j, k, 3) the modes at vertices rows (k,)."""
+        pieces = _pieces(self.basis, self.windows, rows)
+        return (self.mixture @ pieces.reshape(len(pieces), -1)).reshape(len(self), len(rows), 3)
+
+    def along(self, alpha):
+        """(n, 3) the displacement of the whole head by alpha (j,) standard deviations of each mode."""
+        shares = alpha @ self.mixture  # (i + w r,)
+        i, r = len(self.basis), self.windows.shape[1]
+        result = np.tensordot(shares[:i], self.basis, 1)
+        for mode, share in zip(self.basis, shares[i:].reshape(-1, r)):
+            result += (self.windows @ share)[:, None] * mode
+        return result
+
+
 def localized_basis(vertices, basis, face, outer, *, n_windows=WINDOWS, length_mm=LENGTH_MM, share=SHARE, modes=MODES):
-    """Identity basis (j, n, 3), one standard deviation a mode, of the covariance above.
+    """LocalizedBasis of the covariance above.
 
     vertices (n, 3) mm, basis (i, n, 3); face, outer (n,) bool: where components are told apart, the face counting more
     """
     if not len(basis):
-        return basis
+        return LocalizedBasis(basis, np.zeros((len(vertices), 0)), np.zeros((0, 0)))
     windows = _windows(vertices, outer, n_windows, length_mm)
     rows = np.flatnonzero(face | outer)
     rows = rows[:: max(1, len(rows) // SAMPLES)]
     measure = np.sqrt(np.where(face[rows], 1.0, OUTSIDE_WEIGHT))[None, :, None]
-    wide = basis[:WIDE_MODES]
-    local = (wide[:, None, rows] * windows[rows].T[None, :, :, None]).reshape(-1, len(rows), 3)  # (i r, k, 3)
-    pieces = np.concatenate([np.sqrt(1 - share) * basis[:, rows], np.sqrt(share) * local])
-    flat = (pieces * measure).reshape(len(pieces), -1)
+    pieces = _pieces(basis, windows, rows)
+    scale = np.where(np.arange(len(pieces)) < len(basis), np.sqrt(1 - share), np.sqrt(share))
+    flat = (scale[:, None, None] * pieces * measure).reshape(len(pieces), -1)
     values, vectors = np.linalg.eigh(flat @ flat.T)
-    vectors = vectors[:, np.argsort(values)[::-1][: min(modes, len(values))]].T  # (j, i + i r)
-    i, w = len(basis), len(wide)
-    result = np.sqrt(1 - share) * (vectors[:, :i] @ basis.reshape(i, -1)).reshape(len(vectors), -1, 3)
-    in_window = np.sqrt(share) * vectors[:, i:].reshape(len(vectors), w, -1)
-    flat_wide = wide.reshape(w, -1)
-    for r in range(in_window.shape[2]):
-        field = (in_window[:, :, r] @ flat_wide).reshape(len(vectors), -1, 3)
-        result += field * windows[None, :, r, None]
-    return result
+    vectors = vectors[:, np.argsort(values)[::-1][: min(modes, len(values))]].T  # (j, i + w r)
+    return LocalizedBasis(basis, windows, vectors * scale)
+
+
+def _pieces(basis, windows, rows):
+    """(i + w r, k, 3) at vertices rows (k,): the modes (i, n, 3), then the first w of them through windows (n, r)."""
+    wide = basis[:WIDE_MODES, rows]
+    local = wide[:, None] * windows[rows].T[None, :, :, None]  # (w, r, k, 3)
+    return np.concatenate([basis[:, rows], local.reshape(-1, len(rows), 3)])
 
 
 def _windows(vertices, outer, count, length_mm):

@@ -59,7 +59,7 @@ class Expressions:
 def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks, options):
     """Fit the model to a scan.
 
-    mean (n, 3), basis (i, n, 3) one standard deviation each, expressions Expressions, faces (m, 3)
+    mean (n, 3), basis localize.LocalizedBasis, expressions Expressions, faces (m, 3)
     weights (n,) trust in each vertex, 0 leaves it out; rules: skin.SkinRules; target: correspond.Target
     landmarks: points (l, 3) on the scan, scipy sparse (l, n) that takes template vertices to them, weights (l,)
     returns ModelFit
@@ -71,7 +71,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
     areas *= options.n_effective / areas.sum()
     landmark_model = _project(landmark_rows, mean, basis, deltas)
-    linear = np.concatenate([basis[:, sampled], deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
+    linear = np.concatenate([basis.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
     for _ in range(8):
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
@@ -106,16 +106,20 @@ def _sample_rows(mean, faces, weights, count=5000):
 
 
 def _project(matrix, mean, basis, expressions):
+    """Mean (l, 3), basis (i, l, 3) and expressions (e, l, 3) at points that a matrix (l, n) takes from the vertices."""
+    rows = np.unique(matrix.indices)
+    matrix = matrix[:, rows]
+    modes, shapes = basis.at(rows), expressions[:, rows]
     return (
-        matrix @ mean,
-        np.stack([matrix @ mode for mode in basis]) if len(basis) else np.zeros((0, matrix.shape[0], 3)),
-        np.stack([matrix @ shape for shape in expressions]) if len(expressions) else np.zeros((0, matrix.shape[0], 3)),
+        matrix @ mean[rows],
+        np.stack([matrix @ mode for mode in modes]) if len(modes) else np.zeros((0, matrix.shape[0], 3)),
+        np.stack([matrix @ shape for shape in shapes]) if len(shapes) else np.zeros((0, matrix.shape[0], 3)),
     )
 
 
 def _landmark_rows(state, landmark_model, points, weights):
     mean, basis, expressions = landmark_model
-    positions = state.positions(mean, basis, expressions)
+    positions = state.placed(mean + np.tensordot(state.alpha, basis, 1), expressions)
     jacobian = state.jacobian(mean, basis, expressions)
     rows = jacobian.reshape(-1, jacobian.shape[2])  # (3l, p)
     distance = np.linalg.norm(positions - points, axis=1)
@@ -138,16 +142,16 @@ class _State:
         T[:3, :3], T[:3, 3] = self.s * self.R, self.t
         return T
 
-    def positions(self, mean, basis, expressions):
-        shape = mean + np.tensordot(self.alpha, basis, 1) + np.tensordot(self.expression, expressions, 1)
-        return self.s * shape @ self.R.T + self.t
+    def placed(self, shape, expressions):
+        """Points (k, 3) of the person at rest with the expressions (e, k, 3) put on, where the scan has them."""
+        return self.s * (shape + np.tensordot(self.expression, expressions, 1)) @ self.R.T + self.t
 
     def vertices(self):
-        return self.positions(self.mean, self.basis, self.expressions)
+        return self.placed(self.mean + self.basis.along(self.alpha), self.expressions)
 
     def jacobian(self, mean, basis, expressions):
         """(k, 3, p): columns are identity, expression, rotation (3), log scale, translation (3)."""
-        positions = self.positions(mean, basis, expressions)
+        positions = self.placed(mean + np.tensordot(self.alpha, basis, 1), expressions)
         linear = np.concatenate([basis, expressions]) @ (self.s * self.R.T)  # (i + e, k, 3)
         arm = positions - self.t
         k = len(mean)
