@@ -22,6 +22,11 @@ import scipy.sparse as sp
 
 from facewright.solve.quadratic import Factorization
 
+# A symmetric 3 x 3 block is kept as xx, xy, xz, yy, yz, zz.
+_FIRST, _SECOND = [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]
+_SIX, _DIAGONAL = [0, 1, 2, 1, 3, 4, 2, 4, 5], [0, 3, 5]
+_POINT = np.array([1.0, 0, 0, 1.0, 0, 1.0])
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -86,40 +91,47 @@ def vertex_mass(vertices, faces):
 
 
 def _data_terms(rows, vertices):
-    """The 3x3 blocks of the data terms as nine (n, n) matrices (six kept), right-hand side (n, 3), shared diagonal."""
+    """The data terms as a (3n, 3n) matrix of 3 x 3 blocks, right-hand side (n, 3), what the axes share (n, n)."""
     n = len(vertices)
-    blocks = {}
     b = np.zeros((n, 3))
-    diagonal = sp.csr_matrix((n, n))
+    keys, blocks = [], []
     for term in rows:
         residual = term.targets - term.matrix @ vertices
-        matrix, transposed = term.matrix, term.matrix.T.tocsr()
         if term.normals is None:
-            shared = transposed @ sp.diags(term.weights) @ matrix
-            for axis in range(3):
-                blocks[axis, axis] = blocks.get((axis, axis), 0) + shared
-                b[:, axis] += transposed @ (term.weights * residual[:, axis])
-            diagonal = diagonal + shared
-            continue
-        height = np.einsum("rc,rc->r", term.normals, residual)
-        for axis in range(3):
-            b[:, axis] += transposed @ (term.weights * term.normals[:, axis] * height)
-            for other in range(axis, 3):
-                weights = term.weights * term.normals[:, axis] * term.normals[:, other]
-                block = transposed @ sp.diags(weights) @ matrix
-                blocks[axis, other] = blocks.get((axis, other), 0) + block
-        diagonal = diagonal + transposed @ sp.diags(term.weights / 3.0) @ matrix
-    return blocks, b, diagonal
+            b += term.matrix.T @ (term.weights[:, None] * residual)
+            per_row = term.weights[:, None] * _POINT
+        else:
+            height = np.einsum("rc,rc->r", term.normals, residual)
+            b += term.matrix.T @ ((term.weights * height)[:, None] * term.normals)
+            per_row = term.weights[:, None] * term.normals[:, _FIRST] * term.normals[:, _SECOND]
+        row, one, other, value = _products(term.matrix)
+        keys.append(one * n + other)
+        blocks.append(value[:, None] * per_row[row])
+    places, inverse = np.unique(np.concatenate(keys), return_inverse=True)
+    blocks = np.concatenate(blocks)
+    six = np.stack([np.bincount(inverse, blocks[:, i], len(places)) for i in range(6)], axis=1)
+    columns, starts = places % n, np.searchsorted(places, np.arange(n + 1) * n)
+    A = sp.bsr_matrix((six[:, _SIX].reshape(-1, 3, 3), columns, starts), shape=(3 * n, 3 * n))
+    shared = sp.csr_matrix((six[:, _DIAGONAL].mean(axis=1), columns, starts), shape=(n, n))
+    return A, b, shared
 
 
-def _conjugate_gradients(shared, blocks, b, preconditioner, x, tolerance, max_iterations):
+def _products(matrix):
+    """Pairs of entries in the same row of a csr matrix: row, column, other column and product, each (p,)."""
+    counts = np.diff(matrix.indptr)
+    row_of = np.repeat(np.arange(len(counts)), counts)
+    partners = counts[row_of]
+    first = np.repeat(np.arange(matrix.nnz), partners)
+    row = row_of[first]
+    place = np.arange(len(first)) - np.repeat(np.cumsum(partners) - partners, partners)
+    second = matrix.indptr[row] + place
+    indices = matrix.indices.astype(np.int64)
+    return row, indices[first], indices[second], matrix.data[first] * matrix.data[second]
+
+
+def _conjugate_gradients(shared, data, b, preconditioner, x, tolerance, max_iterations):
     def apply(v):
-        result = shared @ v
-        for (axis, other), block in blocks.items():
-            result[:, axis] += block @ v[:, other]
-            if other != axis:
-                result[:, other] += block @ v[:, axis]
-        return result
+        return shared @ v + (data @ v.ravel()).reshape(-1, 3)
 
     residual = b - apply(x)
     z = preconditioner.solve(residual)
