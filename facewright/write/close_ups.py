@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from facewright.conventions import MOUTH_PAIRS
-from facewright.evaluate.play import Player, both_sides
+from facewright.evaluate.play import both_sides
 from facewright.evaluate.shapes import shape_names, with_base
 from facewright.mesh.raster import Camera
-from facewright.mesh.scene import Scene
 from facewright.write.sheet import Cell, Section
 
 WEIGHTS = (0.5, 1.0)
@@ -18,7 +15,6 @@ SIZE = (152, 292)  # (height, width) in pixels
 COLUMNS = 6
 EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
 _UPPER, _MIDDLE = ("eye", "brow"), ("cheekSquint", "noseSneer")  # what is looked at; the rest is the mouth's
-_AROUND_MM = 30.0  # beyond the picture's edge: what may come into it
 
 
 def close_up_poses(rig):
@@ -37,13 +33,11 @@ def close_up_poses(rig):
     return sorted_out
 
 
-def close_up_sections(rig, drawables, picture, run):
+def close_up_sections(rig, puppet, run=map):
     """Sections of a contact sheet; played with in-betweens and correctives where the rig has them.
 
-    drawables  function (Rig) -> list of scene.Drawable; picture  function (Scene, Camera) -> (h, w, 3)
-    run        a map, that of a thread pool or the builtin one
+    puppet  the rig's puppet.Puppet; run  a map, that of a thread pool or the builtin one
     """
-    play = Player(rig, full=True)
     titles = ("Eyes and brows", "Cheeks and nose", "Mouth and jaw")
     sections = []
     for title, camera, poses in zip(titles, close_up_cameras(rig), close_up_poses(rig)):
@@ -51,8 +45,8 @@ def close_up_sections(rig, drawables, picture, run):
 
         def cell(job, camera=camera):
             label, weights, share = job
-            posed = posed_rig(rig, play, {name: share * weight for name, weight in weights.items()}, camera)
-            return Cell(picture(Scene(drawables(posed)), camera), label if share == 1.0 else f"{label}, {share:g}")
+            image = puppet.picture({name: share * weight for name, weight in weights.items()}, camera)
+            return Cell(image, label if share == 1.0 else f"{label}, {share:g}")
 
         cells = list(run(cell, jobs))
         rows = tuple(tuple(cells[i : i + COLUMNS]) for i in range(0, len(cells), COLUMNS))
@@ -80,19 +74,3 @@ def close_up_cameras(rig):
     eyes, mouth = middles
     frames = ((eyes + [0.0, 8.0, 0.0], 27.0), (0.5 * (eyes + mouth), 46.0), (mouth + [0.0, -9.0, 0.0], 36.0))
     return [Camera.looking_at(center, 0.0, 0.0, half_height, SIZE) for center, half_height in frames]
-
-
-def posed_rig(rig, play, weights, camera):
-    """The Rig in a pose, without targets; only the faces that can come into the picture."""
-    half = camera.half_height * np.array([camera.size[1] / camera.size[0], 1.0]) + _AROUND_MM
-    meshes = []
-    for mesh in rig.meshes:
-        vertices = play(mesh, weights)
-        inside = (np.abs(vertices - camera.center)[:, :2] < half).all(axis=1)
-        kept = inside[mesh.faces].any(axis=1)
-        if kept.any():
-            faces, uv_faces = mesh.faces[kept], mesh.uv_faces[kept]
-            meshes.append(replace(mesh, vertices=vertices, faces=faces, uv_faces=uv_faces, deltas=None))
-        elif mesh is rig.meshes[0]:
-            meshes.append(replace(mesh, vertices=vertices, deltas=None))
-    return replace(rig, meshes=tuple(meshes))

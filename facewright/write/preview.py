@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import io
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from PIL import Image
 
+from facewright.evaluate.shapes import shape_names
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.raster import Camera
 from facewright.mesh.render import srgb_to_linear
-from facewright.mesh.scene import CLAY_LINEAR, Drawable, Scene
+from facewright.mesh.scene import Drawable, Scene
 from facewright.write.close_ups import close_up_sections
 from facewright.write.files import replace_file
-from facewright.write.sheet import PANEL, Cell, Section, color_bar, compose_sheet
+from facewright.write.puppet import Puppet, picture, rig_drawables
+from facewright.write.sheet import Cell, Section, color_bar, compose_sheet
 
-BACKGROUND = tuple(c / 255.0 for c in PANEL)
 COLUMNS = 9
 THUMBNAIL = (224, 192)
 VIEW = (384, 292)
@@ -30,8 +29,6 @@ HEAT_LIMIT_MM = 0.5
 # sRGB stops of the error scale, from nothing to the limit: dark blue, teal, yellow, red.
 HEAT_STOPS = np.array([(38, 52, 92), (46, 132, 140), (236, 212, 110), (206, 58, 48)], float)
 NOT_SEEN = (88, 88, 94)
-INNER_SHADE = 0.45
-CLAY_MAP_PX = 256
 
 
 def write_preview(rig, scan, face, path, jobs=2):
@@ -49,48 +46,34 @@ def write_preview(rig, scan, face, path, jobs=2):
 
 def preview_sheet(rig, scan, face, jobs=2):
     """The contact sheet as (h, w, 3) uint8."""
-    small = replace(rig, maps={name: _at_most(image, CLAY_MAP_PX) for name, image in rig.maps.items()})
-    played, plain = small, small.plain()
+    clay = Puppet(rig)
     scenes = {
         "scan": Scene(scan_drawables(scan, textured=True)),
         "rig": Scene(rig_drawables(rig, textured=True)),
         "scan clay": Scene(scan_drawables(scan, textured=False)),
-        "rig clay": Scene(rig_drawables(small, textured=False)),
+        "rig clay": clay.scene,
         "fit": Scene([heat_drawable(scan, face)]),
     }
     wanted = [(name, view, camera) for name in scenes for view, camera in _head_cameras(rig).items()]
     for name in scenes:
         size = FIT_CLOSE_UP if name == "fit" else CLOSE_UP
         wanted += [(name, view, camera) for view, camera in _close_up_cameras(rig, size).items()]
-    thumbnail_camera = _shape_camera(rig)
+    shapes, shape_camera = shape_names(rig), _shape_camera(rig)
     with ThreadPoolExecutor(max(1, jobs)) as pool:
-        rendered = pool.map(lambda job: _picture(scenes[job[0]], job[2]), wanted)
-        pictures = {(name, view): picture for (name, view, _), picture in zip(wanted, rendered)}
-        closer = close_up_sections(played, partial(rig_drawables, textured=False), _picture, pool.map)
-        shapes = list(pool.map(lambda t: _shape_cell(plain, t, thumbnail_camera), range(-1, len(plain.target_names))))
+        rendered = pool.map(lambda job: picture(scenes[job[0]], job[2]), wanted)
+        pictures = {(name, view): image for (name, view, _), image in zip(wanted, rendered)}
+        closer = close_up_sections(rig, clay, pool.map)
+        cells = list(pool.map(lambda name: _shape_cell(clay, name, shapes, shape_camera), (None, *shapes)))
     sections = [
         _neutral_section(pictures, scan),
         _close_up_section(pictures, face),
         _fit_section(pictures),
-        _shape_section(shapes),
+        _shape_section(cells),
         *closer,
     ]
     triangles = sum(len(mesh.faces) for mesh in rig.meshes)
-    subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(plain.target_names)} shapes"
+    subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(shapes)} shapes"
     return compose_sheet(str(rig.info.get("name", scan.name)), subtitle, sections)
-
-
-def _at_most(image, pixels):
-    """The image halved until it is no larger; clay pictures show eyes and teeth small, a hundred times over."""
-    while min(image.shape[:2]) >= 2 * pixels:
-        even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2].astype(np.uint16)
-        pairs = even[0::2] + even[1::2]
-        image = ((pairs[:, 0::2] + pairs[:, 1::2] + 2) // 4).astype(np.uint8)
-    return image
-
-
-def _picture(scene, camera):
-    return scene.render(camera, background=BACKGROUND)
 
 
 def _neutral_section(pictures, scan):
@@ -123,13 +106,12 @@ def _shape_section(cells):
     return Section("Shapes at weight 1", rows, "Left is the person's left: on the right in these pictures")
 
 
-def _shape_cell(rig, target, camera):
-    """The clay rig under one target; -1 is the neutral. mouthClose is made for an open jaw and shown with it."""
-    targets = () if target < 0 else (target,)
-    name = "neutral" if target < 0 else rig.target_names[target]
-    if name == "mouthClose" and "jawOpen" in rig.target_names:
-        targets, name = (target, rig.target_names.index("jawOpen")), "mouthClose + jawOpen"
-    return Cell(_picture(Scene(rig_drawables(rig, textured=False, targets=targets)), camera), name)
+def _shape_cell(clay, name, names, camera):
+    """The clay rig under one plain shape, None the neutral. mouthClose is made for an open jaw and shown with it."""
+    weights = {} if name is None else {name: 1.0}
+    if name == "mouthClose" and "jawOpen" in names:
+        weights["jawOpen"] = 1.0
+    return Cell(clay.picture(weights, camera, full=False), " + ".join(weights) or "neutral")
 
 
 def scan_drawables(scan, textured):
@@ -146,37 +128,6 @@ def scan_drawables(scan, textured):
     if textured and scan.colors is not None:
         return [Drawable(scan.vertices, scan.faces, color=srgb_to_linear(scan.colors))]
     return [Drawable(scan.vertices, scan.faces)]
-
-
-def rig_drawables(rig, textured, targets=()):
-    """A Drawable per mesh of the rig under targets at weight 1. Clay keeps the colours of eyes, teeth and tongue."""
-    drawables = []
-    for mesh in rig.meshes:
-        material = mesh.material
-        if material.alpha < 0.05 or (not textured and material.alpha < 0.9):
-            continue
-        vertices = mesh.vertices
-        if targets and mesh.deltas is not None:
-            vertices = vertices + sum(mesh.deltas[target] for target in targets)
-        looks = {"color": material.color, "roughness": material.roughness, "opacity": material.alpha}
-        if textured:
-            maps = {"texture": rig.maps.get(material.albedo), "normal_map": rig.maps.get(material.normal)}
-            looks |= {**maps, "uv": mesh.uv, "uv_faces": mesh.uv_faces}
-        elif mesh is rig.meshes[0]:
-            looks = {"color": _clay_with_dark_inside(rig)}
-        elif material.albedo in rig.maps:
-            looks |= {"texture": rig.maps[material.albedo], "uv": mesh.uv, "uv_faces": mesh.uv_faces}
-        drawables.append(Drawable(vertices, mesh.faces, **looks))
-    return drawables
-
-
-def _clay_with_dark_inside(rig):
-    """(n, 3) linear clay, darker inside mouth, sockets and nostrils, where no light would reach."""
-    color = np.tile(CLAY_LINEAR, (len(rig.meshes[0].vertices), 1))
-    for name in ("mouth_interior", "socket_left", "socket_right", "nostrils"):
-        if name in rig.regions:
-            color[rig.regions[name]] *= INNER_SHADE
-    return color
 
 
 def heat_drawable(scan, face):

@@ -1,0 +1,76 @@
+"""A rig to be pictured in any pose, in colour or in clay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facewright.evaluate.play import Player
+from facewright.mesh.scene import CLAY_LINEAR, Drawable, Scene
+from facewright.write.sheet import PANEL
+
+BACKGROUND = tuple(c / 255.0 for c in PANEL)
+INNER_SHADE = 0.45
+CLAY_MAP_PX = 256
+
+
+class Puppet:
+    """A Rig that stands ready: a pose only moves what it moves."""
+
+    def __init__(self, rig, textured=False):
+        self._meshes = shown_meshes(rig, textured)
+        self._players = {full: Player(rig, full) for full in (True, False)}
+        self.scene = Scene(rig_drawables(rig, textured))
+
+    def picture(self, weights, camera, full=True):
+        """(h, w, 3) of the rig under dict shape -> weight; full: with in-betweens and correctives."""
+        vertices = self._players[full].meshes(self._meshes, weights)
+        return picture(self.scene.posed(vertices, camera), camera)
+
+
+def picture(scene, camera):
+    """(h, w, 3) uint8 of a Scene on the ground of a contact sheet."""
+    return scene.render(camera, background=BACKGROUND)
+
+
+def shown_meshes(rig, textured):
+    """The meshes of a rig that are seen; clay is not seen through."""
+    return [mesh for mesh in rig.meshes if mesh.material.alpha >= (0.05 if textured else 0.9)]
+
+
+def rig_drawables(rig, textured):
+    """A Drawable for each of shown_meshes. Clay keeps the colours of eyes, teeth and tongue."""
+    drawables = []
+    for mesh in shown_meshes(rig, textured):
+        material = mesh.material
+        looks = {"color": material.color, "roughness": material.roughness, "opacity": material.alpha}
+        if textured:
+            maps = {"texture": rig.maps.get(material.albedo), "normal_map": rig.maps.get(material.normal)}
+            looks |= {**maps, "uv": mesh.uv, "uv_faces": mesh.uv_faces}
+        elif mesh is rig.meshes[0]:
+            looks = {"color": _clay_with_dark_inside(rig)}
+        elif material.albedo in rig.maps:
+            looks |= {
+                "texture": _at_most(rig.maps[material.albedo], CLAY_MAP_PX),
+                "uv": mesh.uv,
+                "uv_faces": mesh.uv_faces,
+            }
+        drawables.append(Drawable(mesh.vertices, mesh.faces, **looks))
+    return drawables
+
+
+def _clay_with_dark_inside(rig):
+    """(n, 3) linear clay, darker inside mouth, sockets and nostrils, where no light would reach."""
+    color = np.tile(CLAY_LINEAR, (len(rig.meshes[0].vertices), 1))
+    for name in ("mouth_interior", "socket_left", "socket_right", "nostrils"):
+        if name in rig.regions:
+            color[rig.regions[name]] *= INNER_SHADE
+    return color
+
+
+def _at_most(image, pixels):
+    """The image halved until it is no larger; clay pictures show eyes and teeth small, a hundred times over."""
+    while min(image.shape[:2]) >= 2 * pixels:
+        even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2].astype(np.uint16)
+        pairs = even[0::2] + even[1::2]
+        image = ((pairs[:, 0::2] + pairs[:, 1::2] + 2) // 4).astype(np.uint8)
+    return image
