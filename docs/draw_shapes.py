@@ -16,21 +16,18 @@ from render import jpeg_bytes
 from facewright.contact import part_lips
 from facewright.data import Face
 from facewright.errors import InputError
-from facewright.evaluate.play import Player
 from facewright.mesh.raster import Camera
-from facewright.mesh.scene import Scene
 from facewright.parts import fit_parts
 from facewright.pipeline import rig_from_face
 from facewright.template.store import read_template
-from facewright.write.close_ups import close_up_cameras, close_up_poses, posed_rig
+from facewright.write.close_ups import close_up_cameras, close_up_poses
 from facewright.write.files import replace_file
-from facewright.write.preview import BACKGROUND, rig_drawables
+from facewright.write.puppet import Puppet
 from facewright.write.sheet import Cell, Section, compose_sheet
 
 NAMES = ("eyes", "cheeks", "mouth")
 IN_A_ROW = 2  # shapes, each with a picture per template
 FACE, FACE_COLUMNS = (232, 196), 7
-clay = partial(rig_drawables, textured=False)
 
 
 def template_rig(name):
@@ -47,14 +44,13 @@ def template_rig(name):
 
 def beside_each_other(rigs, where):
     """A sheet of one part of the face: each shape, the templates' pictures next to each other. rigs: name -> Rig"""
-    players = {name: Player(rig, full=True) for name, rig in rigs.items()}
+    puppets = {name: Puppet(rig) for name, rig in rigs.items()}
     poses = {name: close_up_poses(rig)[where] for name, rig in rigs.items()}
     cells = []
     for label in dict.fromkeys(label for found in poses.values() for label in found):
         for name, rig in rigs.items():
             camera = close_up_cameras(rig)[where]
-            posed = posed_rig(rig, players[name], poses[name].get(label, {}), camera)
-            picture = Scene(clay(posed)).render(camera, background=BACKGROUND)
+            picture = puppets[name].picture(poses[name].get(label, {}), camera)
             cells.append(Cell(picture, f"{label} ({name})" if label in poses[name] else f"{name} has none"))
     columns = IN_A_ROW * len(rigs)
     rows = tuple(tuple(cells[i : i + columns]) for i in range(0, len(cells), columns))
@@ -63,13 +59,12 @@ def beside_each_other(rigs, where):
 
 def whole_faces(rig, poses, title):
     """A sheet of the whole face in named poses."""
-    play = Player(rig, full=True)
+    puppet = Puppet(rig)
     eyes, _, mouth = (camera.center for camera in close_up_cameras(rig))
     camera = Camera.looking_at(0.5 * (eyes + mouth) + [0.0, 3.0, 0.0], 12.0, 0.0, 88.0, FACE)
     cells = []
     for label, weights in poses.items():
-        picture = Scene(clay(posed_rig(rig, play, weights, camera))).render(camera, background=BACKGROUND)
-        cells.append(Cell(picture, label))
+        cells.append(Cell(puppet.picture(weights, camera), label))
     rows = tuple(tuple(cells[i : i + FACE_COLUMNS]) for i in range(0, len(cells), FACE_COLUMNS))
     return compose_sheet(title, "", [Section("", rows)])
 

@@ -35,9 +35,9 @@ from facewright.write.preview import (
     heat_colors,
     heat_drawable,
     preview_sheet,
-    rig_drawables,
     scan_drawables,
 )
+from facewright.write.puppet import Puppet, rig_drawables
 from facewright.write.sheet import CAPTION, GROUND
 
 MOST_BYTES = 300_000
@@ -126,8 +126,8 @@ def preview(sample):
 
 def expression(rig, names, camera):
     """The textured rig with some targets at 1."""
-    targets = tuple(rig.target_names.index(name) for name in names)
-    return picture(rig_drawables(rig, textured=True, targets=targets), camera)
+    posed = Puppet(rig, textured=True).posed(dict.fromkeys(names, 1.0), camera, full=False)
+    return posed.render(camera, background=BACKGROUND).copy()
 
 
 def picture(drawables, camera):

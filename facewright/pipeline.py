@@ -20,13 +20,16 @@ from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
 from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, build_rig, find_irises, fit_parts
 from facewright.read import read_scan
+from facewright.read.images import check_image
 from facewright.read.named import named_files
+from facewright.read.scan import check_scan_file
 from facewright.register import RegisterOptions, register
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
 from facewright.transfer import keep_within_regions, ride_on_lids, transfer_shapes
 from facewright.write.credits import write_credits
+from facewright.write.files import PngOnce
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
 from facewright.write.preview import write_preview
@@ -153,6 +156,7 @@ def rig_job(path, out, options=None, progress=None):
     options = options or JobOptions()
     rerun_from = _stage_number(options.from_stage)
     inputs = _input_digests(path, options)
+    placed = read_landmarks(options.landmarks) if options.landmarks else {}
     folder = find_template(options.template)
     template = read_template(folder)
     output = OutputFolder(out)
@@ -160,20 +164,20 @@ def rig_job(path, out, options=None, progress=None):
     store.sweep()
     run = _Run(store, progress, rerun_from)
     try:
-        return _run_job(run, Path(path), output, options, inputs, template, folder)
+        return _run_job(run, Path(path), output, options, inputs, placed, template, folder)
     except InputError:
         output.remove_what_is_new()
         raise
 
 
-def _run_job(run, path, output, options, inputs, template, folder):
+def _run_job(run, path, output, options, inputs, placed, template, folder):
     scan, clean_stats = _read(run, path, options, inputs)
-    scan, landmarks, pose_info = _landmarks(run, scan, options, inputs)
+    scan, landmarks, pose_info = _landmarks(run, scan, options, inputs, placed)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, scan, face, template)
     shapes, figures = _transfer(run, face, template, options.jobs)
     maps = _bake(run, scan, face, options)
-    report = _write(run, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
+    report = _write(run, path, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
     report["reused"] = run.reused
     report["peak_memory_mb"] = peak_memory_mb()
@@ -194,9 +198,7 @@ def _read(run, path, options, inputs):
     return unpack_scan(arrays, info), info["clean"]
 
 
-def _landmarks(run, scan, options, inputs):
-    placed = read_landmarks(options.landmarks) if options.landmarks else {}
-
+def _landmarks(run, scan, options, inputs, placed):
     def work():
         found = find_landmarks(scan, LandmarkOptions(options.up, options.units, options.mirror, placed))
         arrays, info = pack_scan(found.scan)
@@ -251,7 +253,7 @@ def rig_from_face(face, maps=None, jobs=1):
 def _transfer(run, face, template, jobs):
     def work():
         targets = shapes_of(face, jobs)
-        bare = _assembled(face, targets, options=AssemblyOptions(eyes=None))
+        bare = _assembled(face, targets, options=AssemblyOptions(eyes=None, painted=False))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
         info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in targets.in_betweens.items()]
@@ -296,7 +298,7 @@ def _bake(run, scan, face, options):
     return arrays
 
 
-def _write(run, scan, face, shapes, figures, maps, found, output, options):
+def _write(run, path, scan, face, shapes, figures, maps, found, output, options):
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
@@ -306,7 +308,7 @@ def _write(run, scan, face, shapes, figures, maps, found, output, options):
         report = plain(build_report(scan, face, carried, *found) | figures)
         earlier = run.store.last_info("07-write").get("files", {})
         with output.workshop() as folder:
-            write_results(rig, maps, scan, face, folder, options)
+            write_results(rig, maps, scan, face, folder, options, path.name)
             return {}, {"report": report, "files": output.publish(folder, earlier)}
 
     def intact(info):
@@ -317,18 +319,18 @@ def _write(run, scan, face, shapes, figures, maps, found, output, options):
     ]
 
 
-def write_results(rig, maps, scan, face, folder, options):
-    """Every file of a result but report.json and stages/."""
-    plain_rig = rig.plain()
-    carried = rig.full() if options.shapes == "full" else plain_rig
+def write_results(rig, maps, scan, face, folder, options, title=None):
+    """Every file of a result but report.json and stages/; title is that of the preview."""
+    carried = rig.full() if options.shapes == "full" else rig.plain()
+    png = PngOnce()
     if "glb" in options.formats:
-        write_gltf(carried, folder / "rig.glb")
+        write_gltf(carried, folder / "rig.glb", png=png)
     if "obj" in options.formats:
-        write_obj(carried, folder / "obj")
+        write_obj(carried, folder / "obj", png=png)
     write_credits(rig, folder / "CREDITS.txt")
-    write_rig(rig, folder / "rig")
-    write_textures(maps, folder / "textures", describe_maps(face, maps))
-    write_preview(rig, scan, face, folder / "preview.png", options.jobs)
+    write_rig(rig, folder / "rig", png=png)
+    write_textures(maps, folder / "textures", describe_maps(face, maps), png=png)
+    write_preview(rig, scan, face, folder / "preview.png", options.jobs, title)
 
 
 def _rig_to_scan(scan):
@@ -337,7 +339,10 @@ def _rig_to_scan(scan):
 
 
 def _input_digests(path, options) -> dict[str, Any]:
-    """Digests of everything the user gave; InputError for what is not there."""
+    """Digests of everything the user gave; InputError for what is not there or of no known format."""
+    check_scan_file(path)
+    for image in filter(None, (options.albedo, options.normal_map)):
+        check_image(image)
     files = {"scan": path, "albedo": options.albedo, "normal_map": options.normal_map}
     digests: dict[str, Any] = {}
     for what, file in {**files, "landmarks": options.landmarks}.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
 from facewright.bake.texels import at_corners, at_points, unit_rows
@@ -23,6 +25,7 @@ class ScanLooks:
 
     def __init__(self, scan, with_normals=True):
         self.scan = scan
+        self._growing = threading.Lock()
         self.pyramids = tuple([texture] for texture in scan.textures)
         self.normal_pyramid = [scan.normal_map] if scan.normal_map is not None else None
         self.mapped = scan.uv is not None and (scan.has_texture or scan.normal_map is not None)
@@ -76,7 +79,8 @@ class ScanLooks:
         result = np.empty((len(face), pyramid[0].shape[2]), np.float32)
         for number in np.unique(level):
             chosen = np.flatnonzero(level == number)
-            image = _pyramid_level(pyramid, number)
+            with self._growing:  # two threads that want the same level would both append it
+                image = _pyramid_level(pyramid, number)
             scale = np.array(image.shape[1::-1], float)
             xy = self._pixels(face[chosen], barycentric[chosen], scale)
             result[chosen] = sample_pixels(image, xy)

@@ -21,11 +21,13 @@ SKIN_MAPS = ("albedo", "normal")
 @dataclass(frozen=True)
 class AssemblyOptions:
     """eyes      how eyes are painted; None leaves them plain
+    painted   whether the small maps of teeth, gums and lashes are painted; a rig that is only measured needs none
     left_out  parts that the rig shall not have, by the beginning of their names, where they just hang on the skin:
               lash cards without a texture and veils made for one size of ball are worse than nothing
     """
 
     eyes: EyeLook | None = field(default_factory=EyeLook)
+    painted: bool = True
     left_out: tuple[str, ...] = ("lashes", "occlusion", "blend", "lacrimal")
 
 
@@ -146,7 +148,7 @@ def _material(template, part, maps, options):
         # Through the pupil of a separate iris its own back is seen, from within.
         plain |= {"color": (1.0, 1.0, 1.0), "double_sided": part.name != part.attach}
         return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
-    if "paint" in look:
+    if "paint" in look and options.painted:
         name = f"{part.material}_albedo"
         painted = {} if name in maps else {name: PAINTERS[look["paint"]](look)}
         return Material(part.material, **plain | {"color": (1.0, 1.0, 1.0)}, albedo=name), painted

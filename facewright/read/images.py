@@ -18,16 +18,12 @@ MAX_PIXELS = 16384 * 16384
 
 def read_image(path):
     """(h, w, 3) uint8 of an image file, as stored: alpha dropped, no colour profile applied."""
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, an image was expected; give a PNG or JPEG file")
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: this image does not exist; check the name") from None
-    except OSError as error:
-        raise InputError(f"{path}: this image cannot be read ({error.strerror}); check its permissions") from None
-    return decode_image(data, path.name)
+    return decode_image(_content(Path(path)), Path(path).name)
+
+
+def check_image(path):
+    """InputError where a file cannot be an image of use; told from its head, without decoding it."""
+    _opened(_content(Path(path)), Path(path).name, lambda image, label: None)
 
 
 def read_named_image(source):
@@ -39,6 +35,22 @@ def read_named_image(source):
 
 def decode_image(data, label):
     """(h, w, 3) uint8 of an image file's bytes; label names it in messages."""
+    return _opened(data, label, _as_rgb)
+
+
+def _content(path):
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, an image was expected; give a PNG or JPEG file")
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: this image does not exist; check the name") from None
+    except OSError as error:
+        raise InputError(f"{path}: this image cannot be read ({error.strerror}); check its permissions") from None
+
+
+def _opened(data, label, use):
+    """use(image, label) of an image file's bytes opened by Pillow."""
     limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
     try:
         with warnings.catch_warnings():
@@ -49,7 +61,7 @@ def decode_image(data, label):
                 raise InputError(
                     f"{label}: the image has {width} x {height} pixels, more than 16384 x 16384; shrink it"
                 )
-            return _as_rgb(image, label)
+            return use(image, label)
     except (OSError, SyntaxError, ValueError, EOFError, MemoryError) as error:
         raise InputError(
             f"{label}: the image cannot be decoded ({_short(error)}); save it again as PNG or JPEG"

@@ -28,11 +28,8 @@ def read_scan(path, *, albedo=None, normal_map=None, unit=None):
     """
     path = Path(path)
     unit_mm = unit_in_mm(unit)
-    reader = READERS.get(path.suffix.lower())
-    _check_file(path)
-    if reader is None:
-        raise InputError(f"{path.name}: unknown format {path.suffix!r}; give one of {', '.join(sorted(READERS))}")
-    raw = reader(path)
+    check_scan_file(path)
+    raw = READERS[path.suffix.lower()](path)
     _check_mesh(path, raw)
     uv, uv_faces, without_uv = _checked_uv(path, raw)
     if albedo is not None and uv is None:
@@ -80,7 +77,9 @@ def unit_in_mm(unit):
     return value
 
 
-def _check_file(path):
+def check_scan_file(path):
+    """InputError where a file cannot be a scan: it is not there, empty, or of a format that is not known."""
+    path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: this file does not exist; check the name")
     if path.is_dir():
@@ -92,6 +91,8 @@ def _check_file(path):
         raise InputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
     if empty:
         raise InputError(f"{path.name}: is empty; copy or export it again")
+    if path.suffix.lower() not in READERS:
+        raise InputError(f"{path.name}: unknown format {path.suffix!r}; give one of {', '.join(sorted(READERS))}")
 
 
 def _check_mesh(path, raw):

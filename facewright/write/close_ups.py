@@ -39,6 +39,9 @@ def close_up_sections(rig, puppet, run=map):
     puppet  the rig's puppet.Puppet; run  a map, that of a thread pool or the builtin one
     """
     titles = ("Eyes and brows", "Cheeks and nose", "Mouth and jaw")
+    note = "both sides together; pairs last"
+    if rig.in_betweens or rig.correctives:
+        note += "; played with in-betweens and pair correctives, which the plain 52 shapes lack (--shapes full)"
     sections = []
     for title, camera, poses in zip(titles, close_up_cameras(rig), close_up_poses(rig)):
         jobs = [(label, weights, share) for label, weights in poses.items() for share in WEIGHTS]
@@ -51,7 +54,7 @@ def close_up_sections(rig, puppet, run=map):
         cells = list(run(cell, jobs))
         rows = tuple(tuple(cells[i : i + COLUMNS]) for i in range(0, len(cells), COLUMNS))
         if rows:
-            sections.append(Section(f"{title}, half way and whole", rows, "both sides together; pairs last"))
+            sections.append(Section(f"{title}, half way and whole", rows, note))
     return sections
 
 

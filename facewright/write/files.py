@@ -41,3 +41,16 @@ def png_bytes(pixels, level=3):
     stream = io.BytesIO()
     Image.fromarray(np.squeeze(pixels)).save(stream, "PNG", compress_level=level)
     return stream.getvalue()
+
+
+class PngOnce:
+    """png_bytes that encodes an image once, however many files hold it."""
+
+    def __init__(self):
+        self._known = {}
+
+    def __call__(self, pixels, level=3):
+        key = id(pixels), level
+        if key not in self._known:
+            self._known[key] = pixels, png_bytes(pixels, level)  # kept, or its id might become another's
+        return self._known[key][1]

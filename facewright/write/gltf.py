@@ -26,7 +26,7 @@ from PIL import Image
 
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.tangents import corner_tangents
-from facewright.write.files import replace_file
+from facewright.write.files import png_bytes, replace_file
 
 _FLOAT, _UBYTE, _USHORT, _UINT = 5126, 5121, 5123, 5125
 _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
@@ -49,15 +49,15 @@ class GltfOptions:
     tangents: bool = True
 
 
-def write_gltf(rig, path, options=GltfOptions()):
-    """Write a Rig to path (.glb). Same rig and options, same bytes."""
-    replace_file(path, gltf_bytes(rig, options))
+def write_gltf(rig, path, options=GltfOptions(), png=png_bytes):
+    """Write a Rig to path (.glb). Same rig and options, same bytes. png: how maps are encoded (files.PngOnce)"""
+    replace_file(path, gltf_bytes(rig, options, png))
 
 
-def gltf_bytes(rig, options=GltfOptions()):
+def gltf_bytes(rig, options=GltfOptions(), png=png_bytes):
     """The bytes of a Rig as .glb."""
     document = _Document(_asset(rig))
-    textures = {name: document.add_image(name, *_encode(rig, name, options)) for name in _used_maps(rig)}
+    textures = {name: document.add_image(name, *_encode(rig, name, options, png)) for name in _used_maps(rig)}
     joints = document.add_skeleton(rig.skeleton)
     for mesh in rig.meshes:
         material = document.add_material(mesh.material, textures, _see_through(rig, mesh.material))
@@ -196,17 +196,16 @@ def _used_maps(rig):
     return list(dict.fromkeys(names))
 
 
-def _encode(rig, name, options):
+def _encode(rig, name, options, png):
     """(bytes, mime type) of a map."""
     pixels = rig.maps[name]
     image = Image.fromarray(np.squeeze(pixels))
     is_data = name in {mesh.material.normal for mesh in rig.meshes} or image.mode not in ("RGB", "L")
-    stream = io.BytesIO()
     if is_data:
-        image.save(stream, "PNG", compress_level=options.png_level)
-    else:
-        image.save(stream, "JPEG", quality=options.jpeg_quality, subsampling=0)
-    return stream.getvalue(), "image/png" if is_data else "image/jpeg"
+        return png(pixels, options.png_level), "image/png"
+    stream = io.BytesIO()
+    image.save(stream, "JPEG", quality=options.jpeg_quality, subsampling=0)
+    return stream.getvalue(), "image/jpeg"
 
 
 class _Document:

@@ -12,15 +12,15 @@ from facewright.write.files import file_name, png_bytes, replace_file
 MATERIALS = "rig.mtl"
 
 
-def write_obj(rig, folder):
+def write_obj(rig, folder, png=png_bytes):
     """Write neutral.obj, one OBJ per target, rig.mtl and the maps it names into a folder. Returns the OBJ paths.
 
     Millimetres, in our axes; every mesh is an object ("o skin"); quads stay quads. No vn lines: smooth shading is the
-    reader's, and differs under each target.
+    reader's, and differs under each target. png: how images are encoded (files.PngOnce)
     """
     folder = Path(folder)
     for name, pixels in rig.maps.items():
-        replace_file(folder / f"{file_name(name)}.png", png_bytes(pixels))
+        replace_file(folder / f"{file_name(name)}.png", png(pixels))
     replace_file(folder / MATERIALS, _materials(rig).encode("utf-8"))
     blocks = _static_blocks(rig)
     paths = [folder / "neutral.obj"]

@@ -31,20 +31,21 @@ HEAT_STOPS = np.array([(38, 52, 92), (46, 132, 140), (236, 212, 110), (206, 58, 
 NOT_SEEN = (88, 88, 94)
 
 
-def write_preview(rig, scan, face, path, jobs=2):
+def write_preview(rig, scan, face, path, jobs=2, title=None):
     """Write a contact sheet of a Rig (data.Rig) made from a Scan through a Face, as PNG.
 
     The whole face is shown under the plain shapes, the close-ups as in-betweens and correctives play them.
 
-    scan  in our frame, as the face was fitted to it; jobs is the number of threads, which changes no pixel
+    scan   in our frame, as the face was fitted to it; jobs is the number of threads, which changes no pixel
+    title  over the sheet; default: the scan's name
     """
-    sheet = preview_sheet(rig, scan, face, jobs)
+    sheet = preview_sheet(rig, scan, face, jobs, title)
     buffer = io.BytesIO()
     Image.fromarray(sheet).save(buffer, "png", compress_level=3)
     replace_file(path, buffer.getvalue())
 
 
-def preview_sheet(rig, scan, face, jobs=2):
+def preview_sheet(rig, scan, face, jobs=2, title=None):
     """The contact sheet as (h, w, 3) uint8."""
     clay = Puppet(rig)
     scenes = {
@@ -73,7 +74,7 @@ def preview_sheet(rig, scan, face, jobs=2):
     ]
     triangles = sum(len(mesh.faces) for mesh in rig.meshes)
     subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(shapes)} shapes"
-    return compose_sheet(str(rig.info.get("name", scan.name)), subtitle, sections)
+    return compose_sheet(title or scan.name, subtitle, sections)
 
 
 def _neutral_section(pictures, scan):

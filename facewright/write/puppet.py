@@ -21,10 +21,13 @@ class Puppet:
         self._players = {full: Player(rig, full) for full in (True, False)}
         self.scene = Scene(rig_drawables(rig, textured))
 
+    def posed(self, weights, camera, full=True):
+        """The Scene under dict shape -> weight, for one camera; full: with in-betweens and correctives."""
+        return self.scene.posed(self._players[full].meshes(self._meshes, weights), camera)
+
     def picture(self, weights, camera, full=True):
-        """(h, w, 3) of the rig under dict shape -> weight; full: with in-betweens and correctives."""
-        vertices = self._players[full].meshes(self._meshes, weights)
-        return picture(self.scene.posed(vertices, camera), camera)
+        """(h, w, 3) uint8 of a pose on the ground of a contact sheet."""
+        return picture(self.posed(weights, camera, full), camera)
 
 
 def picture(scene, camera):

@@ -28,13 +28,16 @@ ARRAYS = "arrays.npz"
 _MESH_ARRAYS = ("vertices", "faces", "polygons", "uv", "uv_faces", "uv_polygons", "skin_weights", "deltas")
 
 
-def write_rig(rig, folder):
-    """Write a Rig into a folder (made if needed) that read_rig reads back bit for bit."""
+def write_rig(rig, folder, png=png_bytes):
+    """Write a Rig into a folder (made if needed) that read_rig reads back bit for bit.
+
+    png  how maps are encoded (files.PngOnce)
+    """
     folder = Path(folder)
     maps = {}
     for name, pixels in rig.maps.items():
         maps[name] = {"file": f"maps/{file_name(name)}.png", "shape": list(pixels.shape)}
-        replace_file(folder / maps[name]["file"], png_bytes(pixels))
+        replace_file(folder / maps[name]["file"], png(pixels))
     arrays = npz_bytes(_pack(rig), level=1)
     replace_file(folder / ARRAYS, arrays)
     description = _describe(rig) | {"maps": maps, "arrays_sha256": hashlib.sha256(arrays).hexdigest()}

@@ -28,17 +28,18 @@ CONVENTIONS = {
 }
 
 
-def write_textures(maps, folder, manifest=None):
+def write_textures(maps, folder, manifest=None, png=png_bytes):
     """Write maps, name -> (h, w) or (h, w, c) uint8, as folder/name.png, and folder/manifest.json.
 
     manifest  dict of further entries for the manifest, such as bake.describe_maps
+    png       how maps are encoded (files.PngOnce)
     returns   dict, what manifest.json holds
     raises    InputError when the folder cannot be written
     """
     folder = Path(folder)
     names = sorted(maps)
     with ThreadPoolExecutor(2) as pool:
-        for name, content in zip(names, pool.map(png_bytes, (maps[name] for name in names))):
+        for name, content in zip(names, pool.map(png, (maps[name] for name in names))):
             replace_file(folder / f"{file_name(name)}.png", content)
     entries = {name: _entry(name, maps[name]) for name in names}
     document = {"format": 1, "layout": LAYOUT, "maps": entries, **(manifest or {})}

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from facewright.conventions import ARKIT_SHAPES
-from facewright.evaluate.play import Player
 from facewright.parts import build_rig
-from facewright.write.close_ups import close_up_cameras, close_up_poses, close_up_sections, posed_rig
-from facewright.write.sheet import Cell
+from facewright.write.close_ups import close_up_poses, close_up_sections
 
 
 @pytest.fixture(scope="module")
@@ -26,23 +24,21 @@ def test_every_shape_is_in_one_picture(rig):
     assert poses[2]["mouthClose"] == {"mouthClose": 1.0, "jawOpen": 1.0}
 
 
+class Blank:
+    """A puppet that draws nothing."""
+
+    def picture(self, weights, camera):
+        return np.zeros((4, 4, 3), np.uint8)
+
+
 def test_sections_hold_half_and_whole(rig):
-    sections = close_up_sections(rig, lambda posed: [], lambda scene, camera: None, captions_only)
+    sections = close_up_sections(rig, Blank())
     captions = [cell.caption for section in sections for row in section.rows for cell in row]
     assert len(sections) == 3 and "jawOpen, 0.5" in captions and "jawOpen" in captions
     assert len(captions) == 2 * sum(len(found) for found in close_up_poses(rig))
+    assert not any("in-between" in section.note for section in sections)
 
 
-def captions_only(cell, jobs):
-    """A map that draws nothing."""
-    pixel = np.zeros((4, 4, 3), np.uint8)
-    return [Cell(pixel, label if share == 1.0 else f"{label}, {share:g}") for label, _, share in jobs]
-
-
-def test_only_what_comes_into_the_picture_is_kept(rig):
-    camera = close_up_cameras(rig)[0]
-    posed = posed_rig(rig, Player(rig, True), {"eyeBlinkLeft": 1.0}, camera)
-    assert len(posed.meshes[0].faces) < 0.6 * len(rig.meshes[0].faces)
-    lid = rig.lines["lid_upper_left"]
-    moved = np.linalg.norm(posed.meshes[0].vertices[lid] - rig.meshes[0].vertices[lid], axis=1)
-    assert moved.max() > 5.0 and all(mesh.deltas is None for mesh in posed.meshes)
+def test_what_the_plain_shapes_lack_is_said(rig):
+    played = replace(rig, in_betweens={"jawOpen": {0.5: "jawLeft"}})
+    assert all("in-between" in section.note for section in close_up_sections(played, Blank()))
