@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +101,23 @@ class JobOptions:
             raise ValueError(f"texture_size and jobs are 1 or more, got {self.texture_size} and {self.jobs}")
 
 
+class _Beside:
+    """Work that may be done by a thread of its own while something else goes on, where there is a core for it."""
+
+    def __init__(self, pool, work, jobs):
+        self._pool, self._work, self._jobs = pool, work, jobs
+        self._begun = None
+
+    def begin(self):
+        """Start the work, on half of the threads; one job does one thing at a time."""
+        if self._jobs > 1:
+            self._begun = self._pool.submit(self._work, self._jobs // 2)
+
+    def result(self):
+        """What the work gives, once it is done."""
+        return self._work(self._jobs) if self._begun is None else self._begun.result()
+
+
 class _Run:
     """The stages of one run: looks each up in the cache, times it, reports progress."""
 
@@ -175,8 +194,10 @@ def _run_job(run, path, output, options, inputs, placed, template, folder):
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs, placed)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, scan, face, template)
-    shapes, figures = _transfer(run, face, template, options.jobs)
-    maps = _bake(run, scan, face, options)
+    with ThreadPoolExecutor(1) as beside:
+        baking = _Beside(beside, partial(_baked, scan, face, options), options.jobs)
+        shapes, figures = _transfer(run, face, template, options.jobs, baking)
+        maps = _bake(run, options, baking)
     report = _write(run, path, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
     report["timings_s"] = run.seconds
     report["reused"] = run.reused
@@ -250,8 +271,11 @@ def rig_from_face(face, maps=None, jobs=1):
     return _assembled(face, shapes_of(face, jobs), maps)
 
 
-def _transfer(run, face, template, jobs):
+def _transfer(run, face, template, jobs, beside):
+    """Targets and figures of the shapes; beside: the baking, which needs none of this."""
+
     def work():
+        beside.begin()
         targets = shapes_of(face, jobs)
         bare = _assembled(face, targets, options=AssemblyOptions(eyes=None, painted=False))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
@@ -288,14 +312,18 @@ def _with_riders(face, shapes):
     return replace(shapes, deltas=deltas[:n], extras=dict(zip(shapes.extras, deltas[n:])))
 
 
-def _bake(run, scan, face, options):
-    bake_options = BakeOptions(size=options.texture_size)
-
-    def work():
-        return bake(scan, face, bake_options, options.jobs), {}
-
-    arrays, _ = run.stage("06-bake", work, asdict(bake_options))
+def _bake(run, options, baking):
+    bake_options = _bake_options(options)
+    arrays, _ = run.stage("06-bake", lambda: (baking.result(), {}), asdict(bake_options))
     return arrays
+
+
+def _baked(scan, face, options, jobs):
+    return bake(scan, face, _bake_options(options), jobs)
+
+
+def _bake_options(options):
+    return BakeOptions(size=options.texture_size)
 
 
 def _write(run, path, scan, face, shapes, figures, maps, found, output, options):
@@ -304,11 +332,12 @@ def _write(run, path, scan, face, shapes, figures, maps, found, output, options)
     def work():
         rig = _assembled(face, shapes, maps, AssemblyOptions(eyes=EyeLook(pattern=options.iris)))
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
-        carried = rig.full() if options.shapes == "full" else rig.plain()
-        report = plain(build_report(scan, face, carried, *found) | figures)
         earlier = run.store.last_info("07-write").get("files", {})
-        with output.workshop() as folder:
+        with output.workshop() as folder, ThreadPoolExecutor(1) as beside:
+            told = _Beside(beside, lambda jobs: build_report(scan, face, _carried(rig, options), *found), options.jobs)
+            told.begin()
             write_results(rig, maps, scan, face, folder, options, path.name)
+            report = plain(told.result() | figures)
             return {}, {"report": report, "files": output.publish(folder, earlier)}
 
     def intact(info):
@@ -321,8 +350,16 @@ def _write(run, path, scan, face, shapes, figures, maps, found, output, options)
 
 def write_results(rig, maps, scan, face, folder, options, title=None):
     """Every file of a result but report.json and stages/; title is that of the preview."""
-    carried = rig.full() if options.shapes == "full" else rig.plain()
-    png = PngOnce()
+    with ThreadPoolExecutor(1) as pool:
+        files = _Beside(pool, lambda jobs: _write_files(rig, maps, face, folder, options), options.jobs)
+        files.begin()
+        write_preview(rig, scan, face, folder / "preview.png", options.jobs, title)
+        files.result()
+
+
+def _write_files(rig, maps, face, folder, options):
+    """Every file of a result but the preview."""
+    png, carried = PngOnce(), _carried(rig, options)
     if "glb" in options.formats:
         write_gltf(carried, folder / "rig.glb", png=png)
     if "obj" in options.formats:
@@ -330,7 +367,11 @@ def write_results(rig, maps, scan, face, folder, options, title=None):
     write_credits(rig, folder / "CREDITS.txt")
     write_rig(rig, folder / "rig", png=png)
     write_textures(maps, folder / "textures", describe_maps(face, maps), png=png)
-    write_preview(rig, scan, face, folder / "preview.png", options.jobs, title)
+
+
+def _carried(rig, options):
+    """The Rig with the targets that rig.glb and obj/ carry."""
+    return rig.full() if options.shapes == "full" else rig.plain()
 
 
 def _rig_to_scan(scan):
