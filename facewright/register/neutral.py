@@ -14,7 +14,7 @@ REMOVE_FROM = 0.25
 # A vertex that moves less than this (mm) under the removed shapes keeps what the scan says of it; beyond, the model at
 # rest gives its place and only the smooth part of the person's own shape is carried on.
 KEEP_MM = 0.8
-HOLD_FROM_MM = 22.0
+HOLD_FROM_MM, AROUND_MM = 22.0, 30.0
 # Of the template's aperture: modelled eyes look alert; opened as wide, a face that was scanned asleep stares.
 RELAXED = 0.88
 
@@ -69,6 +69,10 @@ def _template_aperture(template, skin, faces, side):
     pull = np.zeros((n, 3))
     pull[upper] = excess * (skin[partner] - skin[upper])
     hold[upper] = 1e3
-    elastic = ElasticSkin(skin, faces)
-    rows = Rows(sp.identity(n, format="csr"), skin + pull, hold * elastic.mass)
-    return skin + elastic.solve((rows,), 1.0, 0.2, 1e-4, tolerance=1e-6, max_iterations=10)
+    # Only what is near the eye can move; a strip of what holds is enough around it.
+    used, local = np.unique(faces[(near < AROUND_MM)[faces].all(axis=1)], return_inverse=True)
+    elastic = ElasticSkin(skin[used], local.reshape(-1, 3))
+    rows = Rows(sp.identity(len(used), format="csr"), (skin + pull)[used], hold[used] * elastic.mass)
+    opened = skin.copy()
+    opened[used] += elastic.solve((rows,), 1.0, 0.2, 1e-4, tolerance=1e-6, max_iterations=10)
+    return opened

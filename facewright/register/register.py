@@ -32,6 +32,7 @@ SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108,
 # Rings of vertices around a knot in which everything gives way, tried in turn.
 GIVING_WAY = (0, 1, 2, 3)
 FOLD_MM = 3.0  # a face is only held to look as the scan does where the scan is this near
+PLAINLY_OPEN = 0.4  # several times what matters (Target.MIN_OPENNESS)
 KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
@@ -60,7 +61,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     returns    data.Face: fit (as the scan is), vertices (neutral), regions, lines, observed, statistics
     """
     options = options or RegisterOptions()
-    target = Target(scan.vertices, scan.faces, vertex_openness(scan.vertices, scan.faces))
+    target = Target(scan.vertices, scan.faces, _openness(scan.vertices, scan.faces))
     smooth = [landmarks.names.index(f"mp{i}") for i in SMOOTH_LANDMARKS]
     target.compare_roughness(landmarks.positions(scan.vertices, scan.faces)[smooth])
     pairs = landmark_pairs(scan, landmarks, template, placed)
@@ -106,6 +107,14 @@ def register(scan, landmarks, template, options=None, placed=()):
         eyes_closed=closed,
         stats=stats,
     )
+
+
+def _openness(vertices, faces):
+    """(n,) as vertex_openness, told from a quarter of the directions where it is plain that the surface is open."""
+    openness = vertex_openness(vertices, faces, n_directions=32)
+    doubtful = np.flatnonzero(openness < PLAINLY_OPEN)
+    openness[doubtful] = vertex_openness(vertices, faces, subset=doubtful)
+    return openness
 
 
 def _expressions(template, closed):
