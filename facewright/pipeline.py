@@ -41,14 +41,15 @@ from facewright.write.textures import write_textures
 
 STAGES = ("01-read", "02-landmarks", "03-register", "04-parts", "05-transfer", "06-bake", "07-write")
 # Shares of the whole time on a typical scan: they only feed the "time left" of the progress line.
+# Baking goes on while shapes are transferred.
 STAGE_SHARE = {
-    "01-read": 0.04,
-    "02-landmarks": 0.14,
-    "03-register": 0.30,
-    "04-parts": 0.04,
-    "05-transfer": 0.05,
-    "06-bake": 0.23,
-    "07-write": 0.20,
+    "01-read": 0.01,
+    "02-landmarks": 0.08,
+    "03-register": 0.20,
+    "04-parts": 0.02,
+    "05-transfer": 0.36,
+    "06-bake": 0.01,
+    "07-write": 0.32,
 }
 
 

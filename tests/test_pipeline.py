@@ -83,7 +83,7 @@ def forbid(monkeypatch):
 def writes_copy(sample_job, monkeypatch):
     """Writing takes the finished job's files: for runs that are about the stages before."""
 
-    def write_results(rig, maps, scan, face, folder, options):
+    def write_results(rig, maps, scan, face, folder, options, title):
         names = [path.name for path in sample_job.folder.iterdir() if path.name not in ("stages", "report.json")]
         for name in names:
             source = sample_job.folder / name
@@ -185,7 +185,7 @@ def test_other_formats_replace_what_is_no_longer_asked_for(sample_job, copied, f
     own = copied / "textures" / "my notes.txt"
     own.write_text("keep")
     forbid(WORK[:-1])
-    monkeypatch.setattr(pipeline, "write_preview", lambda rig, scan, face, path, jobs: path.write_bytes(b"picture"))
+    monkeypatch.setattr(pipeline, "write_preview", lambda rig, scan, face, path, *_: path.write_bytes(b"picture"))
     report = rig_job(sample_path(), copied, replace(sample_job.options, formats=("obj",)))
     assert [stage for stage in STAGES if not report["reused"][stage]] == ["07-write"]
     assert not (copied / "rig.glb").exists()
@@ -210,7 +210,7 @@ def test_a_killed_run_goes_on_wherever_it_was_killed(sample_job, tmp_path, monke
             rig_job(sample_path(), out, sample_job.options)
         assert [path.name for path in out.iterdir()] == ["stages"]
     with monkeypatch.context() as patch:  # when half of the files are in their places
-        patch.setattr(pipeline, "write_preview", lambda rig, scan, face, path, jobs: path.write_bytes(b"picture"))
+        patch.setattr(pipeline, "write_preview", lambda rig, scan, face, path, *_: path.write_bytes(b"picture"))
         patch.setattr("facewright.output.os.replace", killed_after(3))
         with pytest.raises(Killed):
             rig_job(sample_path(), out, sample_job.options)

@@ -73,7 +73,7 @@ def textured(image):
 
 BAD_SCANS = {
     "missing": (lambda folder: folder / "nobody.obj", "nobody.obj"),
-    "a folder": (lambda folder: folder, "cannot read"),
+    "a folder": (lambda folder: folder, "is a folder"),
     "empty": (text("head.obj", ""), "is empty"),
     "unknown format": (text("head.xyz", "1 2 3"), "unknown format"),
     "truncated GLB": (truncated_glb, "cut.glb"),
@@ -104,6 +104,20 @@ def refused(capsys):
         return lines[-1]
 
     return run
+
+
+@pytest.mark.parametrize("name", ["missing", "a folder", "empty", "unknown format"])
+def test_what_is_plain_from_outside_is_said_before_any_stage(name, tmp_path, capsys):
+    assert main(["rig", str(BAD_SCANS[name][0](tmp_path)), "--out", str(tmp_path / "result")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_so_are_images_and_landmarks_that_cannot_be_used(tmp_path, capsys):
+    scan, broken = text("head.obj", TRIANGLE + "f 1 2 3\n")(tmp_path), text("broken.png", "no picture")(tmp_path)
+    for option, file in (("--albedo", broken), ("--normal-map", tmp_path / "nowhere.png"), ("--landmarks", broken)):
+        assert main(["rig", str(scan), option, str(file), "--out", str(tmp_path / "result")]) == 2
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == 1 and file.name in lines[0]
 
 
 @pytest.mark.parametrize("name", BAD_SCANS)
