@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from facewright.compress import FacezipOptions, facezip, facezip_decode, facezip_maps
 from facewright.compress.folder import atlas_shape, publishing, read_packed, weight_atlas, write_packed
@@ -108,6 +109,13 @@ def test_an_index_that_leads_outside_or_is_broken_is_refused(tmp_path, made):
         read_packed(tmp_path)
     (tmp_path / "facezip.json").write_text("{")
     with pytest.raises(InputError, match="is no packed set"):
+        read_packed(tmp_path)
+
+
+def test_images_of_other_sizes_than_the_neutral_are_refused(tmp_path, made):
+    write_packed(facezip(made.neutral, made.textures), tmp_path)
+    Image.fromarray(made.neutral[:20]).save(tmp_path / "neutral.png")
+    with pytest.raises(InputError, match="different sizes"):
         read_packed(tmp_path)
 
 
