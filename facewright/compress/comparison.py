@@ -25,8 +25,8 @@ from facewright.errors import InputError
 from facewright.write.files import replace_file
 
 SHOWN = ("PCA(8)", "published", "refined")
-FILES = ("table.csv", "expressions.csv", "masks.csv", "restarts.csv", "figures.json")
-FILES += ("errors.png", "permutation.png", "masks.png", "worst.png", "median.png")
+TABLES = ("table.csv", "expressions.csv", "masks.csv", "restarts.csv", "figures.json")
+FILES = (*TABLES, "errors.png", "permutation.png", "masks.png", "worst.png", "median.png")
 ERROR_LIMIT = 32.0
 
 

@@ -47,9 +47,7 @@ def _as_stored(image, data, path):
         image = image.convert("RGBA")
     pixels = np.array(image) if image.mode in ("L", "RGBA", "I;16", "I;16B", "I") else None
     if deep or (pixels is not None and (pixels.min() < 0 or pixels.max() > 65535)):
-        raise InputError(
-            f"{path}: has more than 8 bits of colour or 16 of grey; save it as RGB of 8 or grey of 16 bits"
-        )
+        raise InputError(f"{path}: more than 8 bits of colour or 16 of grey; save it as 8 bits RGB or 16 bits grey")
     if pixels is None:
         return None
     depth = np.uint8 if pixels.dtype == np.uint8 else np.uint16
@@ -66,8 +64,10 @@ def list_textures(folder, neutral):
         files = sorted(folder.iterdir())
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its permissions") from None
-    # Hidden files are an operating system's own notes on the images.
-    paths = [p for p in files if p.suffix.lower() in SUFFIXES and not p.name.startswith(".") and p.resolve() != neutral]
+    # "._smile.png" is what macOS notes about smile.png on other systems' disks.
+    paths = [
+        p for p in files if p.suffix.lower() in SUFFIXES and not p.name.startswith("._") and p.resolve() != neutral
+    ]
     if not paths:
         raise InputError(f"{folder}: holds no images; PNG, JPEG, TIFF, BMP, TGA and WebP are read")
     names = [path.stem for path in paths]

@@ -1,4 +1,4 @@
-"""Textures as they lie on a user's disk: every bit is kept or the file is refused, and notes of the system are no images."""
+"""Textures as they lie on a disk: every bit is kept or the file is refused, and notes of the system are no images."""
 
 import struct
 import zlib

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from facewright.compress import FacezipOptions, facezip, facezip_decode, facezip_maps
-from facewright.compress.folder import atlas_shape, publishing, read_packed, weight_atlas, write_packed
+from facewright.compress.folder import atlas_shape, files_of, publishing, read_packed, weight_atlas, write_packed
 from facewright.compress.synthetic import expression_set
 from facewright.errors import InputError
 
@@ -94,7 +94,7 @@ def test_a_new_set_replaces_the_old_and_what_a_killed_run_left(tmp_path, made):
     for k in (4, 2):
         packed = facezip(made.neutral, made.textures, options=FacezipOptions(textures=k))
         (tmp_path / ".facezip-left").mkdir(exist_ok=True)
-        with publishing(tmp_path) as folder:
+        with publishing(tmp_path, files_of(tmp_path)) as folder:
             write_packed(packed, folder)
     assert not (tmp_path / "difference3.png").exists() and not (tmp_path / ".facezip-left").exists()
     assert len(read_packed(tmp_path).textures) == 2
