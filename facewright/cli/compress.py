@@ -166,7 +166,8 @@ def print_summary(packed, about, reader, examples, results):
         print(f"{name}: {len(one.textures)} difference textures, {sum(report['seconds'].values()):.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
         if report["solution"] == "exact":
-            print(f"{name}: exact but for the rounding of the stored step, at most {one.texture_step.max():.3f} of 255")
+            step = one.texture_step[(one.textures != one.texture_zero[:, None, None]).any(axis=(1, 2))].max(initial=0)
+            print(f"{name}: exact but for the rounding of the stored step, {step:.3f} of 255")
         if "mean_rmse_shared" in report:
             pair = (
                 f"RMSE {report['mean_rmse_shared']:.2f} with shared weights, {report['mean_rmse_alone']:.2f} with own"
@@ -231,7 +232,8 @@ class _Reader:
         if not off:
             return []
         worst = max(off, key=lambda stem: off[stem].p95)
-        told = f"{len(off)} textures lie off the neutral, {worst} by up to {off[worst].p95:.1f} texels"
+        many = "1 texture lies" if len(off) == 1 else f"{len(off)} textures lie"
+        told = f"{many} off the neutral, {worst} by up to {off[worst].p95:.1f} texels"
         return [f"{told}: warped back" if align else f"{told}; --align warps them back"]
 
 
