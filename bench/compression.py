@@ -136,9 +136,14 @@ def search(sets, verdict):
         curves = search_curves(textures)
         best, (one, two) = curves["history"][-1].min(), curves["ours"].values()
         rows.append([name, curves["masks"], *(x / best for x in (one, two, curves["bound"])), curves["seconds"]])
-        # Where even the bound is above the bar, restarts are near the optimum already and there is nothing to gain.
+        # Every pair of masks costs the least it can in the bound. Where that alone is above the bar, the best restart is
+        # near the optimum and no search can be so far below it: the bar is then how near to the bound the search comes.
         if curves["bound"] / best <= 0.75:
             verdict.check(name, "search / best of 100 restarts", max(one, two) / best, 0.75)
+        else:
+            verdict.check(
+                name, "search / bound (no state is at 0.75 of the best restart)", max(one, two) / curves["bound"], 1.15
+            )
         verdict.check(name, "two seeds differ by", abs(one - two) / min(one, two), 0.01)
     header = ["set", "masks", "seed 0", "seed 1", "bound for any state", "seconds"]
     print_table("Permutation cost / that of the best of 100 random restarts", header, rows)

@@ -18,6 +18,7 @@ from facewright.compress.ktx2 import encoder_missing, raw_ktx2, texture_ktx2
 from facewright.compress.packed import Packed, atlas_shape
 from facewright.compress.runtime import GLSL, HLSL
 from facewright.compress.threads import in_threads
+from facewright.compress.tiles import Grid
 from facewright.errors import InputError
 from facewright.write.files import file_name
 
@@ -255,21 +256,35 @@ def _read_map(folder, about, entry):
     across, down = weights["places"]
     count, k = len(weights["layers"]), len(differences)
     atlas = np.concatenate([read_texture(_inside(folder, a["file"])) for a in weights["atlas"]], axis=2)
-    cells = atlas.reshape(down, rows, across, columns, -1).transpose(0, 2, 1, 3, 4)
     neutral = read_texture(_inside(folder, entry["neutral"]["file"]))
     textures = np.stack([read_texture(_inside(folder, d["file"])) for d in differences])
-    if textures.shape[1:] != neutral.shape or textures.dtype != neutral.dtype:
-        raise ValueError("neutral and differences have different sizes or depths")
+    steps, zeros = (np.array([d[key] for d in differences], float) for key in ("step", "zero"))
+    weight_steps, weight_zeros = (np.array([w[key] for w in weights["layers"]], float) for key in ("step", "zero"))
+    layers = np.array(list(about["expressions"].values()))
+    fits = (
+        textures.shape[1:] == neutral.shape
+        and textures.dtype == neutral.dtype
+        and (rows, columns) == Grid(*neutral.shape[:2]).cells
+        and atlas.shape[:2] == (down * rows, across * columns)
+        and steps.shape == zeros.shape == (k, neutral.shape[2])
+        and weight_steps.shape == weight_zeros.shape == (count, k)
+        and layers.dtype.kind == "i"
+        and layers.min() >= 0
+        and layers.max() < count
+    )
+    if not fits:
+        raise ValueError(f"images and {INDEX} do not fit each other")
+    cells = atlas.reshape(down, rows, across, columns, -1).transpose(0, 2, 1, 3, 4)
     return Packed(
         neutral=neutral,
         textures=textures,
-        texture_step=np.array([d["step"] for d in differences]),
-        texture_zero=np.array([d["zero"] for d in differences]),
+        texture_step=steps,
+        texture_zero=zeros,
         weights=np.ascontiguousarray(cells.reshape(-1, rows, columns, atlas.shape[2])[:count, :, :, :k]),
-        weight_step=np.array([layer["step"] for layer in weights["layers"]]),
-        weight_zero=np.array([layer["zero"] for layer in weights["layers"]]),
+        weight_step=weight_steps,
+        weight_zero=weight_zeros,
         names=tuple(about["expressions"]),
-        layers=np.array(list(about["expressions"].values())),
+        layers=layers,
         report=entry["report"],
     )
 

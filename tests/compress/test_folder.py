@@ -115,7 +115,28 @@ def test_an_index_that_leads_outside_or_is_broken_is_refused(tmp_path, made):
 def test_images_of_other_sizes_than_the_neutral_are_refused(tmp_path, made):
     write_packed(facezip(made.neutral, made.textures), tmp_path)
     Image.fromarray(made.neutral[:20]).save(tmp_path / "neutral.png")
-    with pytest.raises(InputError, match="different sizes"):
+    with pytest.raises(InputError, match="do not fit"):
+        read_packed(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda about: about["expressions"].update(expression00=99),
+        lambda about: about["expressions"].update(expression00=-1),
+        lambda about: about["expressions"].update(expression00=0.5),
+        lambda about: about["weights"].update(places=[2, 3]),
+        lambda about: about["maps"]["color"]["differences"][0].update(step=[1.0]),
+        lambda about: about["weights"]["layers"].pop(),
+        lambda about: about.update(weight_size=[7, 7]),
+        lambda about: about.update(maps={}),
+    ],
+)
+def test_an_index_that_does_not_fit_its_images_is_refused(tmp_path, made, spoil):
+    about = write_packed(facezip(made.neutral, made.textures, names=made.names), tmp_path)
+    spoil(about)
+    (tmp_path / "facezip.json").write_text(json.dumps(about))
+    with pytest.raises(InputError, match="is no packed set"):
         read_packed(tmp_path)
 
 
