@@ -136,8 +136,8 @@ def search(sets, verdict):
         curves = search_curves(textures)
         best, (one, two) = curves["history"][-1].min(), curves["ours"].values()
         rows.append([name, curves["masks"], *(x / best for x in (one, two, curves["bound"])), curves["seconds"]])
-        # In the bound every pair of masks costs the least it can. Where that alone is above the bar, the best restart is
-        # near the optimum and no search can be so far below it: the bar is then how near to the bound the search comes.
+        # In the bound every pair of masks costs its least. Where that alone is above the bar, the best restart is near
+        # the optimum and no search can be so far below it: the bar is then how near to the bound the search comes.
         if curves["bound"] / best <= 0.75:
             verdict.check(name, "search / best of 100 restarts", max(one, two) / best, 0.75)
         else:
