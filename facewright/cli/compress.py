@@ -163,7 +163,8 @@ def print_summary(packed, about, reader, examples, results):
     for name, one in packed.items():
         rmse, report = one.report["rmse"], one.report
         worst = max(rmse, key=rmse.__getitem__)
-        print(f"{name}: {len(one.textures)} difference textures, {sum(report['seconds'].values()):.1f} s")
+        reading, whole = report["seconds"]["reading"], sum(report["seconds"].values())
+        print(f"{name}: {len(one.textures)} difference textures, {whole - reading:.1f} s, reading {reading:.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
         if report["solution"] == "exact":
             step = one.texture_step[(one.textures != one.texture_zero[:, None, None]).any(axis=(1, 2))].max(initial=0)
