@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,7 @@ from facewright.compress.packed import with_examples
 from facewright.compress.synthetic import ExpressionSource, expression_set
 
 TEXTURES = ROOT.parent / "shared" / "data" / "textures"
+FACES = "unrelated-faces-512"
 PARTS = ("quality", "search", "seams", "examples", "time", "published")
 # strength and noise of the generated sets; the last has as much noise as signal
 GENERATED = ((14, 0), (14, 2), (8, 1), (30, 2), (14, 5))
@@ -64,6 +66,23 @@ def generated_sets():
         yield f"generated {strength}/{noise}", textures, made.signal_rms / noise if noise else np.inf
 
 
+def face_sets(name, textures, seed=0):
+    """(name, TextureSet, inf): sets of 16 or more of the faces of a set, taken by chance; in two of them another face
+    is the neutral one."""
+    rng = np.random.default_rng(seed)
+    faces = [textures.neutral, *textures.textures]
+    for count, neutral in ((16, 0), (16, 0), (17, 0), (18, 0), (19, 0), (16, 7), (20, 13)):
+        others = [n for n in range(len(faces)) if n != neutral]
+        chosen = sorted(rng.choice(others, count, replace=False))
+        some = replace(
+            textures,
+            neutral=faces[neutral],
+            textures=[faces[n] for n in chosen],
+            names=tuple(f"face{n}" for n in chosen),
+        )
+        yield f"{name}: {count} of them" + (f" against {neutral}" if neutral else ""), some, np.inf
+
+
 def quality(sets, verdict):
     """RMSE of all methods on all sets against the bars."""
     rows = []
@@ -83,10 +102,11 @@ def quality(sets, verdict):
         if bound <= 0.8 * mean["PCA(4)"]:
             verdict.check(name, "refined - PCA(4), any texture", (ours.rmse - outcomes["PCA(4)"].rmse).max(), 0.0)
         if name.startswith("unrelated"):
-            verdict.check(name, "mean RMSE", mean["refined"], 3.1)
-            verdict.check(name, "worst RMSE", ours.rmse.max(), 3.5)
             for other in ("PCA(8)", "published"):
                 verdict.check(name, f"refined / {other}", mean["refined"] / mean[other], 0.4)
+        if name == FACES:
+            verdict.check(name, "mean RMSE", mean["refined"], 3.1)
+            verdict.check(name, "worst RMSE", ours.rmse.max(), 3.5)
             check_blocks(name, textures, ours, verdict)
         if textures.truth is not None and signal >= 2.5:
             for other in ("PCA(8)", "published"):
@@ -116,9 +136,14 @@ def search(sets, verdict):
         curves = search_curves(textures)
         best, (one, two) = curves["history"][-1].min(), curves["ours"].values()
         rows.append([name, curves["masks"], *(x / best for x in (one, two, curves["bound"])), curves["seconds"]])
-        # Where even the bound is above the bar, restarts are near the optimum already and there is nothing to gain.
+        # In the bound every pair of masks costs its least. Where that alone is above the bar, the best restart is near
+        # the optimum and no search can be so far below it: the bar is then how near to the bound the search comes.
         if curves["bound"] / best <= 0.75:
             verdict.check(name, "search / best of 100 restarts", max(one, two) / best, 0.75)
+        else:
+            verdict.check(
+                name, "search / bound (no state is at 0.75 of the best restart)", max(one, two) / curves["bound"], 1.15
+            )
         verdict.check(name, "two seeds differ by", abs(one - two) / min(one, two), 0.01)
     header = ["set", "masks", "seed 0", "seed 1", "bound for any state", "seconds"]
     print_table("Permutation cost / that of the best of 100 random restarts", header, rows)
@@ -278,7 +303,10 @@ def main():
     folders = options.set if options.set is not None else sorted(TEXTURES.glob("*/")) if TEXTURES.is_dir() else []
     verdict = Verdict()
     sets = [(folder.name, read_set(folder), np.inf) for folder in folders] + list(generated_sets())
-    run = {"quality": quality, "search": search, "seams": seams, "examples": examples}
+    run = {"search": search, "seams": seams, "examples": examples}
+    if "quality" in parts:
+        more = [each for name, textures, _ in sets if name == FACES for each in face_sets(name, textures)]
+        quality(sets + more, verdict)
     for part in parts:
         if part in run:
             run[part](sets, verdict)

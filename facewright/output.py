@@ -35,6 +35,16 @@ class OutputFolder:
             ) from error
         return self.stages
 
+    @contextmanager
+    def taken_back_on_failure(self):
+        """The folder, made and checked; whatever ends the block early, what this run made of it goes again."""
+        self.make()
+        try:
+            yield self.folder
+        except BaseException:
+            self.remove_what_is_new()
+            raise
+
     def remove_what_is_new(self):
         """Remove the stages and the folder where this run made them, and parents of it that are empty."""
         for path in self._new:

@@ -79,6 +79,31 @@ def triangles(polygons):
     return np.vstack([polygons[:, :3], polygons[polygons[:, 3] >= 0][:, [0, 2, 3]]])
 
 
+@pytest.fixture(scope="session")
+def sheet():
+    """A function: sheet(n=15, size=14.0), a square sheet of n x n vertices in the xy plane that looks along +Z."""
+
+    def make(n=15, size=14.0):
+        x, y = np.meshgrid(np.linspace(0, size, n), np.linspace(0, size, n))
+        vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+        grid = np.arange(n * n).reshape(n, n)
+        polygons = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=2).reshape(-1, 4)
+        return vertices, triangles(polygons)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def turn():
+    """A function: turn(degrees), the rotation (3, 3) about +Y."""
+
+    def make(degrees):
+        angle = np.radians(degrees)
+        return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+    return make
+
+
 BALL_RADIUS_MM = 80.0
 
 

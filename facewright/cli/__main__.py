@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
+import threading
 import warnings
+from contextlib import contextmanager
 
 from facewright import __version__
 from facewright.errors import InputError, StageError
@@ -43,11 +46,24 @@ def build_parser():
     return parser
 
 
+@contextmanager
+def _interrupted_when_ended():
+    """A request to end (SIGTERM) is like Ctrl-C: what was begun is tidied up."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def main(arguments=None):
     """Run a command; returns the exit code."""
     options = build_parser().parse_args(arguments)
     try:
-        with warnings.catch_warnings():
+        with _interrupted_when_ended(), warnings.catch_warnings():
             # Broken input overflows on its way to the sentence that says so; the rest is in the report.
             warnings.simplefilter("ignore", RuntimeWarning)
             return options.run(options) or 0
@@ -58,7 +74,9 @@ def main(arguments=None):
         print(f"facewright: {error} (outcome: {error.outcome})", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("facewright: stopped; the same command goes on from the last finished stage", file=sys.stderr)
+        again = options.command in ("rig", "demo")
+        more = "; the same command goes on from the last finished stage" if again else ""
+        print(f"facewright: stopped{more}", file=sys.stderr)
         return 130
 
 

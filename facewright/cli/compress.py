@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import sys
 import time
+from pathlib import Path
 
 from facewright.errors import InputError
 
@@ -50,7 +51,7 @@ def run(options):
     """Read, compress, write; the set appears whole."""
     from facewright.compress import FacezipOptions, facezip_maps
     from facewright.compress.files import read_examples, read_mask, read_texture, read_uv_mesh
-    from facewright.compress.folder import choose_ktx2, publishing, write_packed
+    from facewright.compress.folder import choose_ktx2, files_of, publishing, write_packed
     from facewright.compress.packed import with_examples
     from facewright.output import OutputFolder
 
@@ -58,17 +59,17 @@ def run(options):
         raise InputError(f"compress: --masks {options.masks}; at least 1 is needed")
     budget = None if options.budget is None else parse_size(options.budget)
     sources = list_maps(options)
+    read = [path for neutral, paths in sources.values() for path in (neutral, *paths.values())]
+    keep_apart(options.out, [*read, options.region, options.priority])
     names = list(next(iter(sources.values()))[1])
     neutral, mesh = read_texture(options.neutral), read_uv_mesh(options.mesh)
     region = None if options.region is None else read_mask(options.region, neutral.shape[:2]) > 0.5
     priority = None if options.priority is None else 1 + 9 * read_mask(options.priority, neutral.shape[:2])
     examples = None if options.examples is None else read_examples(options.examples, names)
-    chosen = FacezipOptions(options.method, options.textures, options.masks, budget=budget)
-    progress = None if options.quiet else Progress()
+    shapes = None if examples is None else len(examples[0])
+    chosen = FacezipOptions(options.method, options.textures, options.masks, budget=budget, shapes=shapes)
     reader = _Reader(sources, mesh, options.align)
-    output = OutputFolder(options.out)
-    output.make()
-    try:
+    with Progress(options.quiet) as progress, OutputFolder(options.out).taken_back_on_failure():
         packed = facezip_maps(
             {name: (reader.neutral(name), reader.of(name)) for name in sources},
             names,
@@ -82,15 +83,12 @@ def run(options):
         results = packed
         if examples is not None:
             results = {name: with_examples(each, *examples) for name, each in packed.items()}
-        with publishing(options.out) as folder:
+        with publishing(options.out, files_of(options.out)) as folder:
             ktx2, missing = choose_ktx2(options.ktx2)
             started = time.perf_counter()
             about = write_packed(results, folder, ktx2, progress)
             written = time.perf_counter()
             notes = [missing, *write_previews(results, folder, reader, names, examples)]
-    except BaseException:
-        output.remove_what_is_new()
-        raise
     print_summary(packed, about, reader, examples, results)
     print(f"files {written - started:.1f} s, preview {time.perf_counter() - written:.1f} s: {options.out}")
     for note in filter(None, [*reader.notes(options.align), *notes]):
@@ -100,10 +98,11 @@ def run(options):
 def list_maps(options):
     """dict map -> (path of its neutral, dict expression -> path); all maps have the same expressions."""
     from facewright.compress.files import list_textures
+    from facewright.write.files import file_name
 
     found = {"color": (options.neutral, options.textures_folder)}
     for name, folder, neutral in options.also:
-        if name in found:
+        if file_name(name) in map(file_name, found):
             raise InputError(f"compress: two maps are called {name!r}; give every --also a name of its own")
         found[name] = (neutral, folder)
     maps = {}
@@ -117,20 +116,26 @@ def list_maps(options):
     return maps
 
 
+def keep_apart(out, inputs):
+    """InputError where images to read lie in the folder of the result, which would replace them or mix with them."""
+    for path in filter(None, inputs):
+        if Path(path).resolve().parent == Path(out).resolve():
+            raise InputError(f"{path} lies in --out {out}; give the result a folder of its own")
+
+
 def parse_size(text):
     """Bytes of "8MB", "500 KiB" or "1e7"."""
     match = re.fullmatch(r"\s*([0-9.]+(?:e[0-9]+)?)\s*([a-zA-Z]*)\s*", text)
     try:
         return int(float(match[1]) * UNITS[match[2].upper()])
-    except (TypeError, ValueError, KeyError):
+    except (TypeError, ValueError, KeyError, OverflowError):
         raise InputError(f"compress: --budget {text!r} is no size; write for example 8MB or 500KiB") from None
 
 
 def write_previews(packed, folder, reader, names, examples):
     """preview.html of the first map, preview_NAME.html of the others; returns sentences on what is left out."""
-    from facewright.compress.folder import cannot_write
+    from facewright.compress.folder import cannot_write, preview_name
     from facewright.compress.preview import preview_missing, preview_page
-    from facewright.write.files import file_name
 
     notes = []
     B = None if examples is None else examples[1]
@@ -141,9 +146,7 @@ def write_previews(packed, folder, reader, names, examples):
             continue
         page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", examples=B)
         try:
-            (folder / ("preview.html" if number == 0 else f"preview_{file_name(name)}.html")).write_text(
-                page, encoding="utf-8"
-            )
+            (folder / preview_name(number, name)).write_text(page, encoding="utf-8")
         except OSError as error:
             raise cannot_write(folder, error) from error
     return notes
@@ -160,10 +163,12 @@ def print_summary(packed, about, reader, examples, results):
     for name, one in packed.items():
         rmse, report = one.report["rmse"], one.report
         worst = max(rmse, key=rmse.__getitem__)
-        print(f"{name}: {len(one.textures)} difference textures, {sum(report['seconds'].values()):.1f} s")
+        reading, whole = report["seconds"]["reading"], sum(report["seconds"].values())
+        print(f"{name}: {len(one.textures)} difference textures, {whole - reading:.1f} s, reading {reading:.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
         if report["solution"] == "exact":
-            print(f"{name}: exact but for the rounding of the stored step, at most {one.texture_step.max():.3f} of 255")
+            step = one.texture_step[(one.textures != one.texture_zero[:, None, None]).any(axis=(1, 2))].max(initial=0)
+            print(f"{name}: exact but for the rounding of the stored step, {step:.3f} of 255")
         if "mean_rmse_shared" in report:
             pair = (
                 f"RMSE {report['mean_rmse_shared']:.2f} with shared weights, {report['mean_rmse_alone']:.2f} with own"
@@ -228,17 +233,28 @@ class _Reader:
         if not off:
             return []
         worst = max(off, key=lambda stem: off[stem].p95)
-        told = f"{len(off)} textures lie off the neutral, {worst} by up to {off[worst].p95:.1f} texels"
+        many = "1 texture lies" if len(off) == 1 else f"{len(off)} textures lie"
+        told = f"{many} off the neutral, {worst} by up to {off[worst].p95:.1f} texels"
         return [f"{told}: warped back" if align else f"{told}; --align warps them back"]
 
 
 class Progress:
     """The stage, the share done and the time left, on standard error."""
 
-    def __init__(self):
+    def __init__(self, quiet=False):
+        self.quiet = quiet
         self.stage, self.started = None, 0.0
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.stage is not None:  # what follows gets a line of its own
+            sys.stderr.write("\n")
+
     def __call__(self, stage, share):
+        if self.quiet:
+            return
         now = time.perf_counter()
         if stage != self.stage:
             if self.stage is not None:

@@ -6,6 +6,8 @@ facewright decompress packed/ --weights smile=0.7,browDown=1 --out frame.png
 from __future__ import annotations
 
 import io
+import math
+from pathlib import Path
 
 from facewright.errors import InputError
 
@@ -28,6 +30,8 @@ def run(options):
     from facewright.compress.folder import read_packed
     from facewright.write.files import replace_file
 
+    if Path(options.out).suffix.lower() != ".png":
+        raise InputError(f"decompress: --out {options.out}: a PNG is written; give a name that ends in .png")
     image = facezip_decode(read_packed(options.packed, options.map), parse_weights(options.weights))
     stream = io.BytesIO()
     Image.fromarray(image[:, :, 0] if image.shape[2] == 1 else image).save(stream, "PNG")
@@ -35,12 +39,20 @@ def run(options):
 
 
 def parse_weights(text):
-    """dict name -> weight of "a=1,b=0.5"."""
-    weights = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        name, _, value = item.rpartition("=")
+    """dict name -> weight of "a=1,b=0.5"; a comma before the next = belongs to a name."""
+    weights, item = {}, ""
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        item += part
+        name, equals, value = item.rpartition("=")
+        if not equals:
+            item += ","
+            continue
         try:
-            weights[name.strip()] = float(value)
+            weights[name.strip()], item = float(value), ""
         except ValueError:
-            raise InputError(f"decompress: {item!r} is no NAME=WEIGHT; write --weights smile=0.7,browDown=1") from None
+            break
+    if item or not all(map(math.isfinite, weights.values())):
+        raise InputError(
+            f"decompress: --weights {text!r} is no list of NAME=WEIGHT; write for example smile=0.7,browDown=1"
+        )
     return weights

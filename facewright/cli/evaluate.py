@@ -25,11 +25,13 @@ COLUMN_WIDTHS = (("full", 9), ("plain 52", 9), ("bar", 10), ("bar of 52", 10))
 
 def add_arguments(parser):
     """Arguments of `facewright evaluate`."""
+    # The first word is optional, which argparse cannot say.
+    parser.usage = "%(prog)s [rig | compression] FOLDER [options]"
     parser.add_argument(
         "result",
         nargs="+",
-        metavar="[rig|compression] FOLDER",
-        help="a folder that `facewright rig` wrote, a GLB (rig), or textures (compression)",
+        metavar="FOLDER",
+        help="a folder that `facewright rig` wrote; after rig: such a folder or a GLB; after compression: textures",
     )
     parser.add_argument(
         "--blends", type=int, default=1000, metavar="N", help="evaluate rig: random blends to try (default: 1000)"
@@ -51,11 +53,11 @@ def run(options):
         evaluate(folder, options)
         return
     if what == ["rig"]:
-        print_bars(Path(folder), options.blends, options.json)
+        print_bars(_existing(folder), options.blends, options.json)
         return
     if what:
         raise InputError(f"evaluate: one folder at a time, got {len(options.result)}; or: evaluate rig FOLDER")
-    figures = collect(Path(folder), options.scan, options.shapes)
+    figures = collect(_existing(folder), options.scan, options.shapes)
     if options.json:
         print(json.dumps(figures, indent=1))
         return
@@ -70,6 +72,13 @@ def run(options):
         print_distances("the rig's neutral against the scan (mm)", rows)
     for name, values in figures.get("shapes", {}).items():
         print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
+
+
+def _existing(path):
+    """The path; InputError where nothing lies there."""
+    if not Path(path).exists():
+        raise InputError(f"evaluate: {path} does not exist; give a folder that `facewright rig` wrote")
+    return Path(path)
 
 
 def print_bars(path, blends, as_json):

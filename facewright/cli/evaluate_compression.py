@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from facewright.cli.compress import Progress
+from contextlib import nullcontext
+
+from facewright.cli.compress import Progress, keep_apart
 from facewright.errors import InputError
 
 
 def evaluate(folder, options):
     """Compare PCA, the published method and the refined one on a folder of textures; print, and write with --out."""
-    from facewright.compress.comparison import compare, plain_figures, table_rows, write_comparison
+    from facewright.compress.comparison import FILES, compare, plain_figures, table_rows, write_comparison
     from facewright.compress.evaluation import TextureSet
     from facewright.compress.files import list_textures, read_texture, read_uv_mesh
     from facewright.compress.folder import publishing
@@ -17,20 +19,16 @@ def evaluate(folder, options):
     if options.neutral is None or options.mesh is None:
         raise InputError("evaluate compression: give --neutral IMAGE and --mesh OBJ of the textures")
     paths = list_textures(folder, options.neutral)
+    if options.out is not None:
+        keep_apart(options.out, [options.neutral, *paths])
     neutral, mesh = read_texture(options.neutral), read_uv_mesh(options.mesh)
     textures = TextureSet.of(neutral, [read_texture(path) for path in paths], [path.stem for path in paths], mesh)
-    output = None if options.out is None else OutputFolder(options.out)
-    if output is not None:
-        output.make()
-    try:
-        result = compare(textures, Progress() if not options.json else None)
-        if output is not None:
-            with publishing(options.out) as workshop:
+    place = nullcontext() if options.out is None else OutputFolder(options.out).taken_back_on_failure()
+    with Progress(options.json) as progress, place as out:
+        result = compare(textures, progress)
+        if out is not None:
+            with publishing(out, [out / name for name in FILES]) as workshop:
                 write_comparison(result, textures, workshop)
-    except BaseException:
-        if output is not None:
-            output.remove_what_is_new()
-        raise
     if options.json:
         print(plain_figures(result))
         return
@@ -44,7 +42,8 @@ def print_result(result, header, rows):
     if "search" in result:
         search = result["search"]
         best = float(search["history"][-1].min())
-        below = ", ".join(f"seed {seed} {100 * (1 - cost / best):.1f} %" for seed, cost in search["ours"].items())
+        shares = {seed: 100 * (1 - cost / best) if best > 0 else 0.0 for seed, cost in search["ours"].items()}
+        below = ", ".join(f"seed {seed} {share:.1f} %" for seed, share in shares.items())
         restarts = search["history"].shape[1]
         print(f"\npermutation cost below the best of {restarts} random restarts: {below}; {search['seconds']:.2f} s")
         print()

@@ -82,9 +82,18 @@ def run_job(scan, options):
     from facewright.pipeline import JobOptions, rig_job
 
     fields = {name: getattr(options, name) for name in JobOptions.__dataclass_fields__ if hasattr(options, name)}
+    earlier = [path for path in _made(options.out).values() if path.exists()]
     with ProgressLine(options.quiet) as progress:
         report = rig_job(scan, options.out, JobOptions(**fields), progress)
     summarise(report, options.out)
+    gone = [str(path) for path in earlier if not path.exists()]
+    if gone:
+        print(f"note: {' and '.join(gone)} of an earlier run was removed; --formats glb,obj writes both")
+
+
+def _made(out):
+    """dict format -> path of what it writes into the folder."""
+    return {"glb": Path(out, "rig.glb"), "obj": Path(out, "obj")}
 
 
 def summarise(report, out):
@@ -95,8 +104,7 @@ def summarise(report, out):
         print(f"scan to face: mean {fit['mean']:.2f} mm, p95 {fit['p95']:.2f} mm; {seconds:.0f} s")
     for warning in report["warnings"]:
         print(f"note: {warning}")
-    made = {"glb": "rig.glb", "obj": "obj/"}
-    files = " and ".join(str(Path(out, made[name])) for name in report["options"]["formats"])
+    files = " and ".join(str(_made(out)[name]) for name in report["options"]["formats"])
     print(f"look at {Path(out, 'preview.png')}; the rig is {files}")
 
 

@@ -25,19 +25,20 @@ from facewright.errors import InputError
 from facewright.write.files import replace_file
 
 SHOWN = ("PCA(8)", "published", "refined")
+TABLES = ("table.csv", "expressions.csv", "masks.csv", "restarts.csv", "figures.json")
+FILES = (*TABLES, "errors.png", "permutation.png", "masks.png", "worst.png", "median.png")
 ERROR_LIMIT = 32.0
 
 
-def compare(textures, progress=None, methods=METHODS):
+def compare(textures, progress=None):
     """Everything that write_comparison writes, of a TextureSet: outcomes by method, bound, search, masks, bytes."""
     progress = progress or (lambda stage, share: None)
-    most = len(textures.textures)
     outcomes = {}
-    for step, (name, options) in enumerate(methods.items()):
-        if options.method == "paper" and most < options.textures:
-            continue
+    for step, (name, options) in enumerate(METHODS.items()):
+        if options.method == "paper" and len(outcomes["PCA(4)"].packed.weights) < options.textures:
+            continue  # fewer different textures than clusters
         outcomes[name] = run_method(textures, name, options)
-        progress("compressing", (step + 1) / len(methods))
+        progress("compressing", (step + 1) / len(METHODS))
     result = {"outcomes": outcomes, "bound": block_bound(textures), "raw_bytes": raw_bytes(textures)}
     result["disk_bytes"] = {name: disk_bytes(outcome.packed) for name, outcome in outcomes.items()}
     if not encoder_missing("bc7") and textures.neutral.dtype == np.uint8:
@@ -106,8 +107,9 @@ def write_comparison(result, textures, folder):
 
 
 def plain_figures(result):
-    """The main table and the search as JSON text."""
+    """The main table and the search as JSON text; what is infinite (the PSNR of what is exact) as null."""
     header, rows = table_rows(result)
+    rows = [[None if isinstance(v, float) and not np.isfinite(v) else v for v in row] for row in rows]
     figures = {"raw_bytes": result["raw_bytes"], "table": [dict(zip(header, row)) for row in rows]}
     if "search" in result:
         search = result["search"]

@@ -40,6 +40,7 @@ class FacezipOptions:
     permute     False leaves the published permutation out (for comparison)
     budget      bytes in memory, uncompressed: the number of difference textures that fits (and, of the published
                 method, the best of some counts of masks)
+    shapes      number of example-based shapes whose weight maps will be stored instead (with_examples), for the budget
     """
 
     method: str = "refined"
@@ -49,6 +50,7 @@ class FacezipOptions:
     seed: int = 0
     permute: bool = True
     budget: int | None = None
+    shapes: int | None = None
 
 
 def facezip(
@@ -80,6 +82,8 @@ def facezip(
     """
     fetch = textures if callable(textures) else (lambda n: textures[n])
     names = tuple(names) if names is not None else tuple(f"texture{n}" for n in range(len(textures)))
+    if not callable(textures) and len(names) != len(textures):
+        raise ValueError(f"{len(names)} names for {len(textures)} textures")
     rest = {"mesh": mesh, "covered": covered, "region": region, "priority": priority, "keep": keep}
     return _compress({"color": (neutral, fetch)}, names, options, progress, **rest)["color"]
 
@@ -95,11 +99,12 @@ def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest
     returns dict name -> Packed; maps that share have the same weights array
     """
     options = options or FacezipOptions()
-    if options.budget is not None:
-        images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
-        k = textures_within(options.budget, images, len(names), options.textures)
-        options = replace(options, textures=k)
     if len(maps) == 1 or share is False:
+        if options.budget is not None and len(maps) > 1:
+            images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
+            layers = options.shapes or len(names)
+            k = textures_within(options.budget, images, layers, options.textures, len(maps))
+            options = replace(options, textures=k)
         return {
             name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
         }
@@ -122,6 +127,8 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
     clock = _Clock()
     if not names:
         raise InputError("compress: no textures; give at least one besides the neutral")
+    if len(set(names)) < len(names):
+        raise ValueError("two textures have the same name")
     _check(options, names, keep)
     neutrals = {name: _as_image(neutral, f"neutral of {name}") for name, (neutral, _) in maps.items()}
     scale = _texel_scale(next(iter(neutrals.values())), mesh, covered, priority)
@@ -135,7 +142,8 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
                 tiles.balance([image.shape[2] for image in neutrals.values()])
         k = options.textures
         if options.budget is not None:
-            k = textures_within(options.budget, list(neutrals.values()), tiles.count, options.textures)
+            layers_kept = options.shapes or tiles.count
+            k = textures_within(options.budget, list(neutrals.values()), layers_kept, options.textures)
         if options.method == "paper" and tiles.count < k:
             raise InputError(
                 f"compress: {tiles.count} different textures cannot form {k} clusters; "

@@ -17,23 +17,41 @@ SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".tga", ".webp"}
 
 
 def read_texture(path):
-    """(h, w, C) as stored: uint8 with 1, 3 or 4 channels, or uint16 with one."""
+    """(h, w, C) as stored: uint8 with 1, 3 or 4 channels, or uint16 with one; InputError where that would lose bits."""
     path = Path(path)
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: this image cannot be read ({error.strerror}); check the name") from None
+    pixels = None
+    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
     try:
         with Image.open(io.BytesIO(data)) as image:
-            mode, (width, height) = image.mode, image.size
-            if width * height <= MAX_PIXELS and mode in ("L", "RGBA", "I;16", "I;16B", "I"):
-                pixels = np.array(image)
-                if pixels.dtype != np.uint8:
-                    pixels = np.clip(pixels, 0, 65535).astype(np.uint16)
-                return pixels.reshape(height, width, -1)
-    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError):
+            if image.width * image.height <= MAX_PIXELS:
+                pixels = _as_stored(image, data, path)
+    except (OSError, SyntaxError, ValueError, EOFError):
         pass  # decode_image says what is wrong
-    return decode_image(data, path.name)
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit
+    return decode_image(data, path.name) if pixels is None else pixels
+
+
+def _as_stored(image, data, path):
+    """(h, w, C) of an opened image, None where it is to be read as RGB; InputError where that would lose bits."""
+    if image.format == "PNG":
+        deep = data[24] == 16 and data[25] != 0  # bit depth and colour type, 0 for grey, of the first chunk
+    else:
+        bits = getattr(image, "tag_v2", {}).get(258, (8,))  # BitsPerSample of a TIFF
+        deep = len(bits) > 1 and max(bits) > 8
+    if image.mode in ("LA", "PA") or (image.mode == "P" and "transparency" in image.info):
+        image = image.convert("RGBA")
+    pixels = np.array(image) if image.mode in ("L", "RGBA", "I;16", "I;16B", "I") else None
+    if deep or (pixels is not None and (pixels.min() < 0 or pixels.max() > 65535)):
+        raise InputError(f"{path}: more than 8 bits of colour or 16 of grey; save it as 8 bits RGB or 16 bits grey")
+    if pixels is None:
+        return None
+    depth = np.uint8 if pixels.dtype == np.uint8 else np.uint16
+    return pixels.astype(depth, copy=False).reshape(image.height, image.width, -1)
 
 
 def list_textures(folder, neutral):
@@ -42,7 +60,14 @@ def list_textures(folder, neutral):
     if not folder.is_dir():
         raise InputError(f"{folder}: is no folder; give the folder that holds the expression textures")
     neutral = Path(neutral).resolve()
-    paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and p.resolve() != neutral)
+    try:
+        files = sorted(folder.iterdir())
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); check its permissions") from None
+    # "._smile.png" is what macOS notes about smile.png on other systems' disks.
+    paths = [
+        p for p in files if p.suffix.lower() in SUFFIXES and not p.name.startswith("._") and p.resolve() != neutral
+    ]
     if not paths:
         raise InputError(f"{folder}: holds no images; PNG, JPEG, TIFF, BMP, TGA and WebP are read")
     names = [path.stem for path in paths]
@@ -82,14 +107,18 @@ def read_mask(path, shape):
 def read_examples(path, names):
     """Shape names (M) and B (N, M) of a CSV: a header with the shapes, then a row for each texture, its name first."""
     try:
-        rows = [row for row in csv.reader(Path(path).read_text(encoding="utf-8-sig").splitlines()) if row]
-        table = {row[0].strip(): [float(value) for value in row[1:]] for row in rows[1:]}
+        rows = [row for row in csv.reader(Path(path).read_text(encoding="utf-8-sig").splitlines()) if any(row)]
         shapes = [name.strip() for name in rows[0][1:]]
-    except (OSError, ValueError, IndexError) as error:
+        table = [(row[0].strip(), [float(value) for value in row[1:]]) for row in rows[1:]]
+    except (OSError, ValueError, IndexError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as a table of weights ({error}); see docs/compress.md") from None
-    missing = [name for name in names if name not in table]
-    if missing or any(len(table[name]) != len(shapes) for name in names):
-        raise InputError(
-            f"{path}: needs a row of {len(shapes)} weights for every texture; look at {missing[:1] or names[0]}"
-        )
-    return shapes, np.array([table[name] for name in names])
+    if not shapes or not all(shapes) or len(set(shapes)) < len(shapes):
+        raise InputError(f"{path}: the first line must name the shapes, each once, after a first cell for the textures")
+    weights = dict(table)
+    for name in names:
+        if sum(row == name for row, _ in table) != 1 or len(weights[name]) != len(shapes):
+            raise InputError(f"{path}: needs one row of {len(shapes)} weights for every texture; look at {name}")
+    B = np.array([weights[name] for name in names])
+    if not np.isfinite(B).all():
+        raise InputError(f"{path}: holds a weight that is no finite number")
+    return shapes, B

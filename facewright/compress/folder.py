@@ -15,16 +15,16 @@ from PIL import Image
 
 from facewright.compress.files import read_texture
 from facewright.compress.ktx2 import encoder_missing, raw_ktx2, texture_ktx2
-from facewright.compress.packed import Packed
+from facewright.compress.packed import Packed, atlas_shape
 from facewright.compress.runtime import GLSL, HLSL
 from facewright.compress.threads import in_threads
+from facewright.compress.tiles import Grid
 from facewright.errors import InputError
 from facewright.write.files import file_name
 
 FORMAT = "facezip-1"
 INDEX = "facezip.json"
 HIDDEN = ".facezip-"
-LARGEST_SIDE = 16384
 # How hard PNG tries: 1 takes a quarter of the time of 6 and is 12 % larger (five images of 512 x 512).
 PNG_LEVEL = 1
 
@@ -98,22 +98,6 @@ def _write_weights(store, packed, prefix):
         "places": list(atlas_shape(*packed.weights.shape[:3])),
         "layers": [{"step": step, "zero": zero} for step, zero in zip(steps, zeros)],
     }
-
-
-def atlas_shape(count, rows, columns):
-    """(across, down) places of weight maps in one image: layer n lies at (n % across, n // across)."""
-    fits = [
-        (across * -(-count // across), max(across * columns, -(-count // across) * rows), across)
-        for across in range(1, count + 1)
-        if across * columns <= LARGEST_SIDE and -(-count // across) * rows <= LARGEST_SIDE
-    ]
-    if not fits:
-        raise InputError(
-            f"compress: {count} weight maps of {columns} x {rows} do not fit an image of {LARGEST_SIDE}; "
-            "split the set or use smaller textures"
-        )
-    across = min(fits)[2]
-    return across, -(-count // across)
 
 
 def weight_atlas(packed, start=0):
@@ -195,10 +179,11 @@ def choose_ktx2(kind):
 
 
 @contextmanager
-def publishing(out):
+def publishing(out, earlier=()):
     """A hidden folder inside out to write into; in the end its files move to out, facezip.json last.
 
-    A set that lay there before stops being one first: while files of two runs lie side by side there is no index.
+    earlier  paths of what an earlier run left, removed before: while files of two runs lie side by side there is no
+             index, so it comes first
     """
     out = Path(out)
     try:
@@ -209,10 +194,8 @@ def publishing(out):
         raise cannot_write(out, error) from error
     try:
         yield workshop
-        stale = _files_of(out)
         try:
-            (out / INDEX).unlink(missing_ok=True)
-            for path in stale:
+            for path in earlier:
                 path.unlink(missing_ok=True)
             for path in sorted(workshop.iterdir(), key=lambda p: p.name == INDEX):
                 os.replace(path, out / path.name)
@@ -222,13 +205,20 @@ def publishing(out):
         shutil.rmtree(workshop, ignore_errors=True)
 
 
-def _files_of(folder):
-    """Paths of the images that facezip.json of a folder names, those inside it only."""
+def preview_name(number, name):
+    """File name of the preview of the map with this number and name."""
+    return "preview.html" if number == 0 else f"preview_{file_name(name)}.html"
+
+
+def files_of(folder):
+    """Paths of a packed set in a folder, the index first: the images that it names, inside the folder only, and the
+    previews."""
+    folder = Path(folder)
     try:
         about = json.loads((folder / INDEX).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return []
-    names = []
+        names = [preview_name(number, name) for number, name in enumerate(about["maps"])]
+    except (OSError, ValueError, KeyError, TypeError):
+        return [folder / INDEX]
 
     def collect(value):
         if isinstance(value, dict):
@@ -239,7 +229,7 @@ def _files_of(folder):
                 collect(each)
 
     collect(about)
-    return [folder / name for name in names if Path(name).name == name]
+    return [folder / INDEX, *(folder / name for name in names if Path(name).name == name)]
 
 
 def read_packed(folder, which=None):
@@ -266,17 +256,35 @@ def _read_map(folder, about, entry):
     across, down = weights["places"]
     count, k = len(weights["layers"]), len(differences)
     atlas = np.concatenate([read_texture(_inside(folder, a["file"])) for a in weights["atlas"]], axis=2)
+    neutral = read_texture(_inside(folder, entry["neutral"]["file"]))
+    textures = np.stack([read_texture(_inside(folder, d["file"])) for d in differences])
+    steps, zeros = (np.array([d[key] for d in differences], float) for key in ("step", "zero"))
+    weight_steps, weight_zeros = (np.array([w[key] for w in weights["layers"]], float) for key in ("step", "zero"))
+    layers = np.array(list(about["expressions"].values()))
+    fits = (
+        textures.shape[1:] == neutral.shape
+        and textures.dtype == neutral.dtype
+        and (rows, columns) == Grid(*neutral.shape[:2]).cells
+        and atlas.shape[:2] == (down * rows, across * columns)
+        and steps.shape == zeros.shape == (k, neutral.shape[2])
+        and weight_steps.shape == weight_zeros.shape == (count, k)
+        and layers.dtype.kind == "i"
+        and layers.min() >= 0
+        and layers.max() < count
+    )
+    if not fits:
+        raise ValueError(f"images and {INDEX} do not fit each other")
     cells = atlas.reshape(down, rows, across, columns, -1).transpose(0, 2, 1, 3, 4)
     return Packed(
-        neutral=read_texture(_inside(folder, entry["neutral"]["file"])),
-        textures=np.stack([read_texture(_inside(folder, d["file"])) for d in differences]),
-        texture_step=np.array([d["step"] for d in differences]),
-        texture_zero=np.array([d["zero"] for d in differences]),
+        neutral=neutral,
+        textures=textures,
+        texture_step=steps,
+        texture_zero=zeros,
         weights=np.ascontiguousarray(cells.reshape(-1, rows, columns, atlas.shape[2])[:count, :, :, :k]),
-        weight_step=np.array([layer["step"] for layer in weights["layers"]]),
-        weight_zero=np.array([layer["zero"] for layer in weights["layers"]]),
+        weight_step=weight_steps,
+        weight_zero=weight_zeros,
         names=tuple(about["expressions"]),
-        layers=np.array(list(about["expressions"].values())),
+        layers=layers,
         report=entry["report"],
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from facewright.errors import InputError
 from facewright.mesh.laplacian import uniform_laplacian
 from facewright.mesh.raster import RayScene
 from facewright.solve.quadratic import Factorization
@@ -85,8 +86,9 @@ def build_masks(mesh, grid, count, *, seed=0, region=None):
         x = np.clip((centre[:, 0] * region.shape[1]).astype(int), 0, region.shape[1] - 1)
         y = np.clip(((1 - centre[:, 1]) * region.shape[0]).astype(int), 0, region.shape[0] - 1)
         inside = region[y, x]
-        if inside.any():
-            faces, uv_faces = faces[inside], uv_faces[inside]
+        if not inside.any():
+            raise InputError("compress: the --region holds no face of the mesh; paint white where the masks shall lie")
+        faces, uv_faces = faces[inside], uv_faces[inside]
     used, local = np.unique(faces, return_inverse=True)
     local = local.reshape(faces.shape)
     points = mesh.vertices[used]

@@ -9,6 +9,8 @@ import numpy as np
 from facewright.compress.tiles import STEP, Grid
 from facewright.errors import InputError
 
+LARGEST_SIDE = 16384
+
 
 @dataclass(frozen=True)
 class Packed:
@@ -54,21 +56,40 @@ class Packed:
 
     def memory_bytes(self):
         """Bytes on a graphics card without block compression: RGB or what the maps have, weights four to an RGBA."""
-        return memory_bytes(self.neutral, len(self.textures), len(self.weights))
+        return memory_bytes([self.neutral], len(self.textures), len(self.weights))
 
 
-def memory_bytes(neutral, k, layers):
-    """Bytes of a neutral like this, k difference textures and so many weight maps."""
-    rows, columns = Grid(*neutral.shape[:2]).cells
-    return int(neutral.nbytes * (1 + k) + layers * -(-k // 4) * 4 * rows * columns)
+def atlas_shape(count, rows, columns):
+    """(across, down) places of weight maps in one image: layer n lies at (n % across, n // across)."""
+    fits = [
+        (across * -(-count // across), max(across * columns, -(-count // across) * rows), across)
+        for across in range(1, count + 1)
+        if across * columns <= LARGEST_SIDE and -(-count // across) * rows <= LARGEST_SIDE
+    ]
+    if not fits:
+        raise InputError(
+            f"compress: {count} weight maps of {columns} x {rows} do not fit an image of {LARGEST_SIDE}; "
+            "split the set or use smaller textures"
+        )
+    across = min(fits)[2]
+    return across, -(-count // across)
 
 
-def textures_within(budget, neutrals, layers, most=4):
-    """The most difference textures of every map whose bytes stay within the budget; InputError where one does not."""
+def memory_bytes(neutrals, k, layers, sets=1):
+    """Bytes of maps with neutrals like these and k difference textures each, and of so many sets of weight maps."""
+    rows, columns = Grid(*neutrals[0].shape[:2]).cells
+    across, down = atlas_shape(layers, rows, columns)
+    images = sum(neutral.nbytes for neutral in neutrals)
+    return int(images * (1 + k) + sets * across * down * -(-k // 4) * 4 * rows * columns)
+
+
+def textures_within(budget, neutrals, layers, most, sets=1):
+    """The most difference textures of every map whose bytes (memory_bytes) stay within the budget; InputError where
+    one does not."""
     for k in range(most, 0, -1):
-        if sum(memory_bytes(neutral, k, layers) for neutral in neutrals) <= budget:
+        if memory_bytes(neutrals, k, layers, sets) <= budget:
             return k
-    least = sum(memory_bytes(neutral, 1, layers) for neutral in neutrals)
+    least = memory_bytes(neutrals, 1, layers, sets)
     raise InputError(
         f"compress: a budget of {budget / 1e6:.2f} MB is too small; one difference texture needs {least / 1e6:.2f} MB, "
         "so give more or smaller textures"

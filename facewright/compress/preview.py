@@ -10,8 +10,9 @@ from importlib import resources
 import numpy as np
 from PIL import Image
 
-from facewright.compress.folder import atlas_shape, weight_atlas
+from facewright.compress.folder import weight_atlas
 from facewright.compress.ktx2 import as_rgba
+from facewright.compress.packed import atlas_shape
 from facewright.compress.runtime import GLSL
 
 # Texels of all originals together; above it they are shown at half the size, and so on.

@@ -129,6 +129,7 @@ class PermutationSearch:
         p = self.permutations
         table = sum(costs[:, :, p[:, None, i], p[None, :, i]] for i in range(k))
         self.table = np.ascontiguousarray(table.transpose(0, 1, 3, 2)).astype(np.float32)  # [mask, other, its p, p]
+        self.moves = self.table.transpose(1, 2, 0, 3)  # [other, its p, mask, p]
         number = {tuple(row): i for i, row in enumerate(p)}
         self.compose = np.array([[number[tuple(a[b])] for b in p] for a in p])
         self.coupled = np.argsort(-costs.sum(axis=(2, 3)), axis=1)
@@ -144,13 +145,10 @@ class PermutationSearch:
         return float(self.table.min(axis=(2, 3)).sum(dtype=np.float64) / 2)
 
     def sweep(self, states):
-        """One sweep: each mask in turn takes its best permutation, the others held; in place, True where it moved."""
-        moved, m = False, np.arange(self.m)
+        """One sweep of the published search: each mask in turn takes its best permutation; in place."""
+        m = np.arange(self.m)
         for k in range(self.m):
-            best = self.table[k][m, states].sum(axis=1).argmin(axis=1)
-            moved |= bool((best != states[:, k]).any())
-            states[:, k] = best
-        return moved
+            states[:, k] = self.table[k][m, states].sum(axis=1).argmin(axis=1)
 
     def restarts(self, count, seed=0, sweeps=10):
         """(count,) costs of the published search (random starts, 10 sweeps), the best state, and costs per sweep."""
@@ -162,32 +160,57 @@ class PermutationSearch:
             history.append(self.cost(states))
         return history[-1], states[history[-1].argmin()], np.array(history)
 
-    def solve(self, seed=0, chains=16, rounds=80, progress=None):
-        """The best state found: descent with kicks. A kick permutes a mask and those coupled to it alike."""
+    def solve(self, seed=0, chains=32, rounds=300, progress=None):
+        """The best state found: descent with kicks. A kick permutes a mask and those coupled to it alike.
+
+        On ten sets two of four seeds differed by up to 0.2 % (1.4 % with six textures for four clusters); with 16
+        chains and 80 rounds by 4 %.
+        """
         rng = np.random.default_rng(seed)
-        states = rng.integers(len(self.permutations), size=(chains, self.m))
-        while self.sweep(states):
-            pass
+        turns, most = len(self.permutations), min(25, self.m)
+        states = rng.integers(turns, size=(chains, self.m))
+        fields = self._fields(states)
+        self._descend(states, fields)
         cost = self.cost(states)
         for round_number in range(rounds):
-            trial = states.copy()
-            for chain in range(chains):
-                group = self.coupled[rng.integers(self.m), : rng.integers(1, 13)]
-                turn = rng.integers(1, len(self.permutations)) if len(self.permutations) > 1 else 0
-                trial[chain, group] = self.compose[trial[chain, group], turn]
-            for _ in range(4):
-                if not self.sweep(trial):
-                    break
+            trial, around = states.copy(), fields.copy()
+            first, size = rng.integers(self.m, size=chains), rng.integers(1, most + 1, size=chains)
+            turn = rng.integers(min(1, turns - 1), turns, size=chains)
+            for step in range(most):
+                chain = np.flatnonzero(size > step)
+                mask = self.coupled[first[chain], step]
+                self._move(trial, around, chain, mask, self.compose[trial[chain, mask], turn[chain]])
+            self._descend(trial, around)
             found = self.cost(trial)
             better = found < cost
-            states[better], cost[better] = trial[better], found[better]
-            if round_number % 20 == 19:  # the worse half goes on from the better half
-                order = cost.argsort()
-                half = chains // 2
-                states[order[chains - half :]], cost[order[chains - half :]] = states[order[:half]], cost[order[:half]]
+            states[better], fields[better], cost[better] = trial[better], around[better], found[better]
+            if round_number % 30 == 29:  # the worse half goes on from the better half
+                good, bad = np.split(cost.argsort()[: chains // 2 * 2], 2)
+                states[bad], fields[bad], cost[bad] = states[good], fields[good], cost[good]
             if progress is not None:
                 progress((round_number + 1) / rounds)
         return states[cost.argmin()]
+
+    def _fields(self, states):
+        """(chains, m, p): what each permutation of each mask would cost, the other masks as they are."""
+        return sum(self.moves[j, states[:, j]] for j in range(self.m))
+
+    def _move(self, states, fields, chain, mask, to):
+        """Give one mask of each of some chains another permutation, in place."""
+        fields[chain] += self.moves[mask, to] - self.moves[mask, states[chain, mask]]
+        states[chain, mask] = to
+
+    def _descend(self, states, fields):
+        """In every chain the mask that gains most takes its best permutation, until none gains; in place."""
+        chain = np.arange(len(states))
+        least = 1e-6 * float(np.abs(fields).max())
+        while len(chain):
+            now = np.take_along_axis(fields[chain], states[chain][:, :, None], axis=2)[:, :, 0]
+            gain = now - fields[chain].min(axis=2)
+            mask = gain.argmax(axis=1)
+            going = gain[np.arange(len(chain)), mask] > least
+            chain, mask = chain[going], mask[going]
+            self._move(states, fields, chain, mask, fields[chain, mask].argmin(axis=1))
 
 
 def published_maps(masks, labels, centroids, chosen):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,8 +15,10 @@ from PIL import Image
 
 from facewright.cli.__main__ import main
 from facewright.cli.compress import parse_size
+from facewright.cli.decompress import parse_weights
 from facewright.compress.folder import read_packed
 from facewright.compress.synthetic import expression_set
+from facewright.errors import InputError
 
 QUAD = "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
 NAMES = ("smile", "frown", "jaw", "blink", "sneer", "puff")
@@ -110,6 +113,125 @@ def test_evaluate_compression(tmp_path, command, capsys):
     assert "give --neutral IMAGE and --mesh OBJ" in capsys.readouterr().err
 
 
+def keep_three(folder):
+    for name in NAMES[3:]:
+        (folder / "textures" / f"{name}.png").unlink()
+
+
+def make_alike(folder):
+    for name in NAMES:
+        shutil.copy(folder / "neutral.png", folder / "textures" / f"{name}.png")
+
+
+def repeat_three(folder):
+    for name, other in zip(NAMES[3:], NAMES):
+        shutil.copy(folder / "textures" / f"{other}.png", folder / "textures" / f"{name}.png")
+
+
+@pytest.mark.parametrize("spoil", [keep_three, make_alike, repeat_three])
+def test_evaluate_compression_of_fewer_different_textures_than_clusters(tmp_path, command, spoil, capsys):
+    spoil(tmp_path)
+    out = tmp_path / "figures"
+    assert main(["evaluate", "compression", *command[1:], "--out", str(out), "--json"]) == 0
+    for text in (capsys.readouterr().out, (out / "figures.json").read_text()):
+        table = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))["table"]
+        assert {row["method"] for row in table} >= {"PCA(4)", "refined"} and "published" not in str(table)
+    assert not (out / "masks.csv").exists()
+
+
+def test_evaluate_compression_replaces_its_own_files_only(tmp_path, command):
+    assert run(command, tmp_path) == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "packed").iterdir()}
+    evaluate = ["evaluate", "compression", *command[1:], "--out", f"{tmp_path}/packed", "--json"]
+    assert main(evaluate) == 0
+    assert (tmp_path / "packed" / "permutation.png").exists()
+    keep_three(tmp_path)
+    assert main(evaluate) == 0
+    assert not (tmp_path / "packed" / "permutation.png").exists()
+    assert {name: (tmp_path / "packed" / name).read_bytes() for name in before} == before
+
+
+def test_a_result_never_lies_among_its_inputs(tmp_path, command, capsys):
+    before = (tmp_path / "neutral.png").read_bytes()
+    for out in (tmp_path, tmp_path / "textures", tmp_path / "textures" / ".." / "textures"):
+        assert main([*command, "--out", str(out), "--quiet"]) == 2
+        assert "a folder of its own" in capsys.readouterr().err
+        assert main(["evaluate", "compression", *command[1:], "--out", str(out), "--json"]) == 2
+        assert "a folder of its own" in capsys.readouterr().err
+    assert (tmp_path / "neutral.png").read_bytes() == before
+    assert len(list((tmp_path / "textures").iterdir())) == len(NAMES)
+
+
+def test_previews_of_an_earlier_set_go_with_it(tmp_path, command):
+    also = ["--also", "height map", f"{tmp_path}/height", f"{tmp_path}/height.png"]
+    assert run(command, tmp_path, *also) == 0
+    assert {path.name for path in (tmp_path / "packed").glob("*.html")} == {"preview.html", "preview_height_map.html"}
+    assert run(command, tmp_path, "--textures", "5") == 0
+    assert not list((tmp_path / "packed").glob("*.html"))
+
+
+def test_example_shapes_count_in_the_budget_and_equal_textures_do_not(tmp_path, command):
+    cells = 4 * 6 * 7
+    repeat_three(tmp_path)
+    image = 3 * 48 * 56
+    assert run(command, tmp_path, "--budget", str(4 * image + 3 * cells)) == 0
+    assert len(read_packed(tmp_path / "packed").textures) == 3
+    rows = [",".join(["texture", *(f"s{m}" for m in range(40))])]
+    rows += [",".join([name, *(str((m % 7) / 7 + n) for m in range(40))]) for n, name in enumerate(NAMES)]
+    (tmp_path / "examples.csv").write_text("\n".join(rows))
+    more = ["--examples", f"{tmp_path}/examples.csv", "--ktx2", "none"]
+    for budget in (4 * image + 39 * cells, 4 * image + 40 * cells):
+        assert run(command, tmp_path, *more, "--budget", str(budget)) == 0
+        about = json.loads((tmp_path / "packed" / "facezip.json").read_text())
+        assert about["bytes"]["memory"] <= budget
+        assert len(about["maps"]["color"]["differences"]) == (3 if budget >= 4 * image + 40 * cells else 2)
+
+
+@pytest.mark.parametrize(
+    "rows,words",
+    [
+        (["texture,a,b", *(f"{name},1,2" for name in NAMES[1:])], "smile"),
+        (["texture,a,b", *(f"{name},1,2" for name in NAMES), "jaw,3,4"], "jaw"),
+        (["texture,a,b", *(f"{name},1" for name in NAMES)], "one row of 2 weights"),
+        (["texture,a,b", *(f"{name},1,nan" for name in NAMES)], "no finite number"),
+        (["texture,a,b", *(f"{name},1,x" for name in NAMES)], "cannot be read"),
+        (["texture,a,a", *(f"{name},1,2" for name in NAMES)], "each once"),
+        (["texture", *NAMES], "must name the shapes"),
+        ([], "cannot be read"),
+    ],
+)
+def test_tables_that_say_too_little_are_refused(tmp_path, command, capsys, rows, words):
+    (tmp_path / "examples.csv").write_text("\n".join(rows))
+    assert run(command, tmp_path, "--examples", f"{tmp_path}/examples.csv") == 2
+    told = capsys.readouterr().err
+    assert words in told and len(told.splitlines()) == 1 and not (tmp_path / "packed").exists()
+
+
+@pytest.mark.parametrize(
+    "weights,wanted",
+    [("smile=0.5, jaw=1", {"smile": 0.5, "jaw": 1}), ("a,b=1,c=d=-2", {"a,b": 1, "c=d": -2}), ("", {})],
+)
+def test_weights(weights, wanted):
+    assert parse_weights(weights) == wanted
+
+
+@pytest.mark.parametrize("weights", ["smile", "smile=", "smile=high", "smile=nan", "smile=1,jaw=inf", "smile=1,jaw"])
+def test_weights_that_are_none(weights):
+    with pytest.raises(InputError, match="no list of NAME=WEIGHT"):
+        parse_weights(weights)
+
+
+def test_decompress_writes_png_only(tmp_path, capsys):
+    assert main(["decompress", str(tmp_path), "--weights", "a=1", "--out", f"{tmp_path}/frame.jpg"]) == 2
+    assert "ends in .png" in capsys.readouterr().err
+
+
+def test_an_error_stands_on_a_line_of_its_own(tmp_path, command, capsys):
+    (tmp_path / "textures" / "zz.png").write_bytes(b"")
+    assert main([*command, "--out", f"{tmp_path}/packed"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("facewright: ")
+
+
 def broken_texture(folder):
     (folder / "textures" / "broken.png").write_bytes(b"\x89PNG")
 
@@ -163,7 +285,9 @@ def test_bad_input_ends_in_exit_code_2_and_leaves_nothing(tmp_path, command, cap
         (["--budget", "lots"], "is no size"),
         (["--masks", "0"], "at least 1"),
         (["--textures", "9"], "1 to 8"),
+        (["--budget", "1e999"], "is no size"),
         (["--also", "color", "x", "y"], "a name of its own"),
+        (["--also", "co/lor", "x", "y", "--also", "co lor", "x", "y"], "a name of its own"),
     ],
 )
 def test_bad_options_are_one_sentence(tmp_path, command, capsys, more, words):
@@ -198,14 +322,23 @@ def test_a_killed_run_leaves_no_index_and_the_next_one_cleans_up(tmp_path, comma
     out = tmp_path / "packed"
     code = "import sys, time\nfrom facewright.compress import folder\nreal = folder._Store.text\n"
     code += "folder._Store.text = lambda self, *a: (real(self, *a), print('written', flush=True), time.sleep(60))\n"
-    code += "from facewright.cli.__main__ import main\nmain(sys.argv[1:])\n"
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, *command, "--out", str(out), "--quiet"], stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout.readline().strip() == "written"
+    code += "from facewright.cli.__main__ import main\nsys.exit(main(sys.argv[1:]))\n"
+
+    def begin(out):
+        arguments = [sys.executable, "-c", code, *command, "--out", str(out), "--quiet"]
+        process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert process.stdout.readline().strip() == "written"
+        return process
+
+    process = begin(out)
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert not [path for path in out.iterdir() if not path.name.startswith(".facezip-")]
+    for number in (signal.SIGTERM, signal.SIGINT):
+        process = begin(tmp_path / "other")
+        process.send_signal(number)
+        assert "stopped" in process.communicate()[1] and process.returncode == 130
+        assert not (tmp_path / "other").exists()
     time.sleep(0.1)
     assert run(command, tmp_path) == 0
     assert not list(out.glob(".facezip-*")) and (out / "facezip.json").exists()

@@ -41,6 +41,12 @@ def test_a_folder_that_is_no_result(tmp_path, capsys):
     assert "rig" in capsys.readouterr().err
 
 
+def test_a_folder_that_does_not_exist(tmp_path, capsys):
+    for words in (["evaluate"], ["evaluate", "rig"]):
+        assert main([*words, str(tmp_path / "nope")]) == 2
+        assert "nope does not exist" in capsys.readouterr().err
+
+
 def test_a_result_without_a_report(small_rig, tmp_path, capsys):
     write_rig(small_rig, tmp_path / "rig")
     assert main(["evaluate", str(tmp_path)]) == 2

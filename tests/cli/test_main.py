@@ -200,7 +200,9 @@ def test_a_command_that_cannot_be_read(arguments, expected, capsys):
     assert len(lines) == 1 and lines[0].startswith("facewright: ") and expected in lines[0] and "--help" in lines[0]
 
 
-@pytest.mark.parametrize("command", [[], ["rig"], ["demo"], ["evaluate"], ["template"], ["template", "build"]])
+@pytest.mark.parametrize(
+    "command", [[], ["rig"], ["demo"], ["evaluate"], ["compress"], ["template"], ["template", "build"]]
+)
 def test_help(command, capsys):
     with pytest.raises(SystemExit) as ended:
         main([*command, "--help"])
@@ -221,3 +223,16 @@ def test_a_finished_job_is_said_in_a_few_lines(sample_job, tmp_path, capsys, mon
     printed = capsys.readouterr().out.splitlines()
     assert printed[0].startswith("scan to face: mean 0.")
     assert "preview.png" in printed[-1] and "rig.glb" in printed[-1]
+
+
+def test_formats_of_an_earlier_run_that_go_are_named(sample_job, tmp_path, capsys, monkeypatch):
+    obj = tmp_path / "result" / "obj"
+
+    def job(scan, out, options, progress):
+        obj.rmdir()
+        return sample_job.report
+
+    obj.mkdir(parents=True)
+    monkeypatch.setattr("facewright.pipeline.rig_job", job)
+    assert main(["demo", "--out", str(tmp_path / "result")]) == 0
+    assert f"{obj} of an earlier run was removed" in capsys.readouterr().out

@@ -37,5 +37,19 @@ def test_a_known_warp_is_found_and_undone(made):
     assert after < 0.5 * before
 
 
+def test_wrinkles_on_a_surface_without_detail_are_no_shift():
+    rng = np.random.default_rng(2)
+    y, x = np.mgrid[:200, :300]
+    smooth = cv2.GaussianBlur(rng.standard_normal((200, 300)), (0, 0), 9)
+    neutral = 32768 + 2000 * smooth / smooth.std()
+    covered = np.ones((200, 300), bool)
+    for _ in range(4):
+        (cy, cx), turn = rng.uniform(50, 150, 2), rng.uniform(0, np.pi)
+        bump = np.exp(-((y - cy) ** 2 / 1800 + (x - cx) ** 2 / 3200))
+        wrinkled = neutral + 3000 * bump * np.sin(0.4 * (np.cos(turn) * x + np.sin(turn) * y))
+        images = (np.rint(image).astype(np.uint16)[:, :, None] for image in (neutral, wrinkled))
+        assert not measure_shift(*images, covered).misaligned
+
+
 def test_nothing_covered_is_no_shift(made):
     assert not measure_shift(made.neutral, made.textures[0], np.zeros((512, 512), bool)).misaligned

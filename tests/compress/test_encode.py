@@ -97,6 +97,20 @@ def test_bad_input_is_refused():
         facezip(neutral, images, keep=["smile"])
 
 
+def test_misuse_is_refused():
+    neutral, images = make_set(2)
+    with pytest.raises(ValueError, match="3 names for 2"):
+        facezip(neutral, images, names=["a", "b", "c"])
+    with pytest.raises(ValueError, match="same name"):
+        facezip(neutral, images, names=["a", "a"])
+
+
+def test_a_region_without_a_face_is_refused():
+    made = expression_set(64, 6)
+    with pytest.raises(InputError, match="holds no face"):
+        build_masks(made.mesh, Grid(64, 64), 12, region=np.zeros((64, 64), bool))
+
+
 def test_a_region_of_priority_is_met_better():
     neutral, images = make_set(14, shape=(64, 64))
     priority = np.ones((64, 64))

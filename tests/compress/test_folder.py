@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from facewright.compress import FacezipOptions, facezip, facezip_decode, facezip_maps
-from facewright.compress.folder import atlas_shape, publishing, read_packed, weight_atlas, write_packed
+from facewright.compress.folder import atlas_shape, files_of, publishing, read_packed, weight_atlas, write_packed
 from facewright.compress.synthetic import expression_set
 from facewright.errors import InputError
 
@@ -93,7 +94,7 @@ def test_a_new_set_replaces_the_old_and_what_a_killed_run_left(tmp_path, made):
     for k in (4, 2):
         packed = facezip(made.neutral, made.textures, options=FacezipOptions(textures=k))
         (tmp_path / ".facezip-left").mkdir(exist_ok=True)
-        with publishing(tmp_path) as folder:
+        with publishing(tmp_path, files_of(tmp_path)) as folder:
             write_packed(packed, folder)
     assert not (tmp_path / "difference3.png").exists() and not (tmp_path / ".facezip-left").exists()
     assert len(read_packed(tmp_path).textures) == 2
@@ -107,6 +108,34 @@ def test_an_index_that_leads_outside_or_is_broken_is_refused(tmp_path, made):
     with pytest.raises(InputError, match="outside the folder"):
         read_packed(tmp_path)
     (tmp_path / "facezip.json").write_text("{")
+    with pytest.raises(InputError, match="is no packed set"):
+        read_packed(tmp_path)
+
+
+def test_images_of_other_sizes_than_the_neutral_are_refused(tmp_path, made):
+    write_packed(facezip(made.neutral, made.textures), tmp_path)
+    Image.fromarray(made.neutral[:20]).save(tmp_path / "neutral.png")
+    with pytest.raises(InputError, match="do not fit"):
+        read_packed(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda about: about["expressions"].update(expression00=99),
+        lambda about: about["expressions"].update(expression00=-1),
+        lambda about: about["expressions"].update(expression00=0.5),
+        lambda about: about["weights"].update(places=[2, 3]),
+        lambda about: about["maps"]["color"]["differences"][0].update(step=[1.0]),
+        lambda about: about["weights"]["layers"].pop(),
+        lambda about: about.update(weight_size=[7, 7]),
+        lambda about: about.update(maps={}),
+    ],
+)
+def test_an_index_that_does_not_fit_its_images_is_refused(tmp_path, made, spoil):
+    about = write_packed(facezip(made.neutral, made.textures, names=made.names), tmp_path)
+    spoil(about)
+    (tmp_path / "facezip.json").write_text(json.dumps(about))
     with pytest.raises(InputError, match="is no packed set"):
         read_packed(tmp_path)
 

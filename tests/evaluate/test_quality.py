@@ -6,29 +6,14 @@ import pytest
 from facewright.evaluate import quality
 
 
-def sheet(n=15, size=14.0):
-    """A square sheet in the xy plane, looking along +Z."""
-    x, y = np.meshgrid(np.linspace(0, size, n), np.linspace(0, size, n))
-    vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    grid = np.arange(n * n).reshape(n, n)
-    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    quads = np.stack([a, b, c, d], axis=2).reshape(-1, 4)
-    return vertices, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-
-
-def turn(degrees):
-    angle = np.radians(degrees)
-    return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-
-
-def test_a_sheet_that_lies_on_its_scan_has_no_fold():
+def test_a_sheet_that_lies_on_its_scan_has_no_fold(sheet):
     vertices, faces = sheet()
     assert not len(
         quality.folded_faces((vertices, faces), vertices + [0.2, 0.1, 0.1], faces, np.ones(len(faces), bool))
     )
 
 
-def test_a_vertex_pushed_past_its_neighbours_folds_faces():
+def test_a_vertex_pushed_past_its_neighbours_folds_faces(sheet):
     vertices, faces = sheet()
     moved = vertices.copy()
     moved[7 * 15 + 7] += [2.5, 0.0, 0.05]
@@ -38,13 +23,13 @@ def test_a_vertex_pushed_past_its_neighbours_folds_faces():
     assert np.array_equal(folded, expected)
 
 
-def test_where_the_scan_has_no_surface_nothing_is_called_folded():
+def test_where_the_scan_has_no_surface_nothing_is_called_folded(sheet):
     vertices, faces = sheet()
     far = vertices + [0, 0, 9.0]
     assert not len(quality.folded_faces((vertices, faces), far, faces[:, ::-1], np.ones(len(faces), bool)))
 
 
-def test_the_far_wall_of_a_narrow_crease_is_no_fold():
+def test_the_far_wall_of_a_narrow_crease_is_no_fold(sheet):
     vertices, faces = sheet()
     back = vertices + [0, 0, 0.3]  # two walls of a crease, 0.3 mm apart, facing each other
     scan = np.vstack([vertices, back]), np.vstack([faces, faces[:, ::-1] + len(vertices)])
@@ -52,7 +37,7 @@ def test_the_far_wall_of_a_narrow_crease_is_no_fold():
     assert not len(quality.folded_faces(scan, fit, faces, np.ones(len(faces), bool)))
 
 
-def test_torn_edges_need_both_length_and_factor():
+def test_torn_edges_need_both_length_and_factor(sheet):
     vertices, faces = sheet()
     moved = vertices.copy()
     moved[0] -= [6.0, 0, 0]
@@ -63,7 +48,7 @@ def test_torn_edges_need_both_length_and_factor():
     assert not len(quality.torn_edges(vertices, moved, faces, mask=np.arange(len(vertices)) > 0))
 
 
-def test_two_sheets_that_cross_are_counted_once_per_pair():
+def test_two_sheets_that_cross_are_counted_once_per_pair(sheet, turn):
     vertices, faces = sheet(n=5, size=4.0)
     other = (vertices - [2, 2, 0]) @ turn(90).T + [2.03, 2.07, 0.01]
     both, both_faces = np.vstack([vertices, other]), np.vstack([faces, faces + len(vertices)])
@@ -74,7 +59,7 @@ def test_two_sheets_that_cross_are_counted_once_per_pair():
     assert len(quality.self_intersections(both, both_faces, np.arange(len(both_faces)) < len(faces))) == 0
 
 
-def test_crossings_of_the_reference_are_not_new():
+def test_crossings_of_the_reference_are_not_new(sheet, turn):
     vertices, faces = sheet(n=5, size=4.0)
     other = (vertices - [2, 2, 0]) @ turn(90).T + [2.03, 2.07, 0.01]
     both, both_faces = np.vstack([vertices, other]), np.vstack([faces, faces + len(vertices)])
@@ -84,7 +69,7 @@ def test_crossings_of_the_reference_are_not_new():
     assert len(quality.new_self_intersections(both, apart, both_faces, everything, everything))
 
 
-def test_an_opening_shows_its_area():
+def test_an_opening_shows_its_area(sheet):
     front, faces = sheet(n=41, size=40.0)
     centers = front[faces].mean(axis=1)
     hole = (np.abs(centers - [20, 20, 0]) < [5, 2, 1]).all(axis=1)

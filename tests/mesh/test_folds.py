@@ -5,28 +5,13 @@ import numpy as np
 from facewright.mesh.folds import folded_by_shape, laid_flat, neighbour_mean
 
 
-def sheet(n=15, size=14.0):
-    """A square sheet in the xy plane, looking along +Z."""
-    x, y = np.meshgrid(np.linspace(0, size, n), np.linspace(0, size, n))
-    vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    grid = np.arange(n * n).reshape(n, n)
-    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    quads = np.stack([a, b, c, d], axis=2).reshape(-1, 4)
-    return vertices, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-
-
-def turn(degrees):
-    angle = np.radians(degrees)
-    return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-
-
-def test_turning_a_head_folds_no_shape():
+def test_turning_a_head_folds_no_shape(sheet, turn):
     vertices, faces = sheet()
     curved = vertices + np.stack([0 * vertices[:, 0], 0 * vertices[:, 0], 0.1 * vertices[:, 0] ** 2], axis=1)
     assert not len(folded_by_shape(curved, curved @ turn(170).T, faces))
 
 
-def test_a_shape_that_turns_a_face_over_is_found():
+def test_a_shape_that_turns_a_face_over_is_found(sheet):
     vertices, faces = sheet()
     moved = vertices.copy()
     moved[7 * 15 + 7] += [2.5, 0.0, 0.0]
@@ -34,7 +19,7 @@ def test_a_shape_that_turns_a_face_over_is_found():
     assert np.array_equal(folded_by_shape(vertices, moved, faces), np.flatnonzero(turned))
 
 
-def test_folds_are_laid_flat_and_nothing_else_moves():
+def test_folds_are_laid_flat_and_nothing_else_moves(sheet):
     vertices, faces = sheet()
     moved = vertices + [0.0, 0.0, 1.0]
     moved[7 * 15 + 7] += [2.5, 0.0, 0.0]
@@ -47,7 +32,7 @@ def test_folds_are_laid_flat_and_nothing_else_moves():
     assert still is flat
 
 
-def test_a_line_has_only_itself_for_neighbours():
+def test_a_line_has_only_itself_for_neighbours(sheet):
     _, faces = sheet()
     mean = neighbour_mean(faces, 225, [np.array([10, 25, 40])])
     assert np.allclose(mean.sum(axis=1), 1.0)
