@@ -15,15 +15,16 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import unique_edges
-from facewright.mesh.folds import laid_flat, neighbour_mean
+from facewright.mesh.folds import laid_flat
 from facewright.mesh.spread import SmoothSpread
 from facewright.solve.quadratic import Factorization
 from facewright.transfer.eyeball import lid_clearance
 
 _KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
 _CORNER_MM = 6.0  # around a canthus the field is evened out
-_LOOSE = 4  # margin points from a canthus on, itself included, that may be smoothed with a fold
-_JOININGS, _FLUSHINGS = 2, 2
+_LOOSE = 4  # margin points from a canthus on, itself included, that may give way to a fold
+_MARGIN_EASE = 0.3  # how readily these do, against skin
+_SETTLINGS, _FLUSHINGS = 3, 2
 _WAVES = 2  # of the closing line between the canthi
 
 
@@ -68,12 +69,11 @@ class Lids:
         self._corner = np.isin(self.skin, self.canthi)
         self._corners = None
         self._near_faces = faces[free[faces].any(axis=1)]
-        self._mean = neighbour_mean(self._near_faces, len(vertices), (self.upper, self.lower))
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
-        self._keep = ~free
+        self._ease = free.astype(float)
+        self._ease[self.margin] = 0.0
         for line in (self.upper, self.lower):
-            self._keep[line[_LOOSE:-_LOOSE]] = True
-        self._keep[self.canthi] = False
+            self._ease[line[1:_LOOSE]] = self._ease[line[-_LOOSE:-1]] = _MARGIN_EASE
 
     def angles(self, points):
         """(k,) radians of elevation of points (k, 3) about the axis, 0 straight ahead."""
@@ -169,29 +169,15 @@ class Lids:
         result[inside] = factor.solve(-(rest @ field[~inside]))
         return result
 
-    def settled(self, pose, shut=False):
-        """The pose (n, 3) without folded faces: where the corners press skin together it is smoothed.
-
-        shut: the margins shall meet, also where they were smoothed
-        """
-        for _ in range(_JOININGS if shut else 0):
-            flat = laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
+    def settled(self, pose, ball=None):
+        """The pose (n, 3) without folded faces: where the corners press skin together it gives way, but not into the
+        ball."""
+        for _ in range(_SETTLINGS):
+            flat = laid_flat(self.V, pose, self._near_faces, self._ease)
             if flat is pose:
-                return pose
-            pose = self._joined(flat)
-        return laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
-
-    def _joined(self, pose):
-        """The pose (n, 3) with the margins' ends half way between each other."""
-        at = pose @ self.axis
-        result = pose.copy()
-        for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
-            ends = np.concatenate([own[1:_LOOSE], own[-2 : -_LOOSE - 1 : -1]])
-            across = np.stack([_along(at[ends], at[other], pose[other, i]) for i in range(3)], axis=1)
-            fading = np.tile(np.linspace(0.5, 0.1, _LOOSE - 1), 2)[:, None]
-            result[ends] += fading * (across - pose[ends])
-            result[ends] += 0.5 * (self._mean[ends] @ result - result[ends])
-        return result
+                break
+            pose = self.lifted(flat, ball)
+        return pose
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
@@ -218,19 +204,18 @@ class Lids:
         result[self.skin] += outward * (lift / np.linalg.norm(outward, axis=1))[:, None]
         return result
 
-    def flush(self, pose):
+    def flush(self, pose, ball=None):
         """The pose (n, 3) of closed lids with both margins equally far from the centre where they meet."""
-        result = pose
         for _ in range(_FLUSHINGS):
-            pose = result
             at = pose @ self.axis
             radius = np.linalg.norm(pose - self.ball.center, axis=1)
-            result = pose.copy()
-            for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
-                wanted = 0.5 * (radius[own] + _along(at[own], at[other], radius[other]))
-                offset = pose[own] - self.ball.center
-                result[own] = self.ball.center + offset * (wanted / radius[own])[:, None]
-        return result
+            rise = [
+                0.5 * (_along(at[own], at[other], radius[other]) - radius[own])
+                for own, other in ((self.upper, self.lower), (self.lower, self.upper))
+            ]
+            share = self.field(*rise) / radius
+            pose = self.lifted(pose + share[:, None] * (pose - self.ball.center), ball)
+        return pose
 
 
 def _frame(upper, lower, center):

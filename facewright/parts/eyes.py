@@ -14,7 +14,7 @@ from facewright.mesh.spread import spread_smoothly
 from facewright.transfer.eyeball import angle_from, eye_parts, lid_clearance, measure_eyeball
 
 EYE_RADIUS_MM = 12.0
-RADIUS_LIMITS_MM = (11.0, 13.0)
+RADIUS_LIMITS_MM = (11.6, 12.4)  # one standard deviation of the axial length of grown-up eyes
 _RIM_DEG, _DRAWN_IN = 38.0, 0.05
 _CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
 
@@ -64,7 +64,7 @@ def place_eyeball(template, vertices, lines, side, radius, options=None, seen=No
     if seen is not None:
         pupil = center + radius * own.axis
         center[:2] += np.clip(seen - pupil[:2], -options.most_shift_mm, options.most_shift_mm)
-    ball = replace(own, center=center, radius=radius, radii=own.radii * scale)
+    ball = replace(own, center=center, radius=radius, surface=own.surface.scaled(scale))
     depth = _depths(ball, margin[inner], options.gap_mm)
     return replace(ball, center=center + [0.0, 0.0, np.median(depth)])
 

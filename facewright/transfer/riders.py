@@ -116,16 +116,17 @@ def ride_on_lids(face, deltas, names, correctives=None):
             pose = deltas[number] + sum(deltas[driver] for driver in drivers)
             moved = rest
             if pose.any():
-                moved = riders.placed(face.vertices + pose, _turned(ball, face.vertices[eye], pose[eye]))
+                moved = riders.placed(face.vertices + pose, _moved(ball, face.vertices[eye], pose[eye]))
             result[number, riders.index] = moved - rest - sum(result[driver, riders.index] for driver in drivers)
     return result
 
 
-def _turned(ball, points, delta):
+def _moved(ball, points, delta):
     """The Eyeball when its mesh's points (k, 3) move by delta (k, 3)."""
     if not delta.any():
         return ball
-    return replace(ball, axis=best_rotation(points, points + delta) @ ball.axis)
+    R, middle = best_rotation(points, points + delta), points.mean(axis=0)
+    return replace(ball.turned(R), center=middle + delta.mean(axis=0) + R @ (ball.center - middle))
 
 
 def _carriers(points, faces, distance):
