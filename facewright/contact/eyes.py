@@ -34,6 +34,7 @@ class EyeShapeOptions:
     look_turn_deg   direction -> degrees by which upper and lower margin follow the gaze (up is positive)
     wide_turn_deg   the same for eyeWide
     squint_share    of the opening by which eyeSquint lowers the upper and raises the lower lid
+    passing_mm      by which lids lie higher where a blink passes on its way
     free_mm         skin this far from the margins may move with the lids
     """
 
@@ -43,6 +44,7 @@ class EyeShapeOptions:
     )
     wide_turn_deg: tuple[float, float] = (12.0, -4.0)
     squint_share: tuple[float, float] = (0.10, 0.30)
+    passing_mm: float = 0.15
     free_mm: float = 14.0
 
 
@@ -100,6 +102,7 @@ class _Eye:
         self.squints = (place * place * (3.0 - 2.0 * place))[:, None]
         free = (distance < options.free_mm) & ~held & ~(socket & (distance > 0.5 * options.free_mm))
         self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
+        faces = faces[: len(faces) // 2]
         self.lid_faces = faces[(free & ~socket)[faces].all(axis=1)]
         self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
 
@@ -184,7 +187,9 @@ class _Eye:
 
     def _blink(self, weight):
         slides = [weight * slide for slide in self.lids.slides(self.V)]
-        pose = self.lids.turned(self.V, *(weight * turn for turn in self._closing_turns()), slides=slides)
+        passing = self.options.passing_mm * (2.0 if weight == 1.0 else 1.0)
+        turns = [weight * turn for turn in self._closing_turns()]
+        pose = self.lids.turned(self.V, *turns, slides=slides, passing_mm=passing)
         return self.lids.flush(pose) if weight == 1.0 else pose
 
     def _wide(self, weight):

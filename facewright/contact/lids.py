@@ -23,8 +23,9 @@ from facewright.transfer.eyeball import lid_clearance
 _KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
 _CORNER_MM = 6.0  # around a canthus the field is evened out
 _LOOSE = 4  # margin points from a canthus on, itself included, that may give way to a fold
-_MARGIN_EASE = 0.3  # how readily these do, against skin
+_MARGIN_EASE = 0.0  # how readily these do, against skin
 _SETTLINGS, _FLUSHINGS = 3, 2
+_FAR_MM = 2.0
 _WAVES = 2  # of the closing line between the canthi
 
 
@@ -38,7 +39,7 @@ class LidMotionOptions:
     """
 
     upper_share: float = 0.8
-    gap_mm: float = 0.15
+    gap_mm: float = 0.22
     skin_clear_mm: float = 0.6
     reach_mm: float = 10.0
     soft_mm: float = 0.1
@@ -133,15 +134,16 @@ class Lids:
             slid[-1 - i] = min(rest[-1 - i], slid[-i] - steps[-i])
         return way * (slid - rest)
 
-    def turned(self, pose, upper_turn, lower_turn, ball=None, slides=None):
+    def turned(self, pose, upper_turn, lower_turn, ball=None, slides=None, passing_mm=0.0):
         """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them.
 
-        slides  (u,), (l,) mm that they move along the axis besides
+        slides  (u,), (l,) mm that they slide along the axis besides
+        passing_mm  as in lifted
         """
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
-            pose = pose + self.field(*slides)[:, None] * self.axis
-        return self.lifted(self.rotated(pose, turns), ball)
+            pose = self.slid(pose, self.field(*slides))
+        return self.lifted(self.rotated(pose, turns), ball, passing_mm)
 
     def field(self, upper, lower):
         """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
@@ -187,18 +189,29 @@ class Lids:
         along = (offset @ axis)[:, None] * axis
         return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
 
-    def lifted(self, pose, ball=None):
-        """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be."""
+    def slid(self, pose, way):
+        """The pose (n, 3) with each vertex moved by (n,) mm along the axis, at the height over the ball that it has."""
+        offset = pose - self.ball.center
+        moved = offset + way[:, None] * self.axis
+        height, now = (np.maximum(np.linalg.norm(v, axis=1), 1e-9) for v in (offset, moved))
+        return self.ball.center + moved * (height / now)[:, None]
+
+    def lifted(self, pose, ball=None, passing_mm=0.0):
+        """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
+
+        passing_mm  how much higher skin lies that has come far: it passes here on chords, to which the ball bulges
+        """
         ball = ball or self.ball
         points = pose[self.skin]
-        missing = self.clear - ball.gap(points)
+        come = np.linalg.norm(points - self.V[self.skin], axis=1)
+        missing = self.clear + passing_mm * np.minimum(come / _FAR_MM, 1.0) - ball.gap(points)
         width = self.options.soft_mm
         lift = 0.5 * (missing + np.sqrt(missing**2 + width**2))
         rest = self.clear - self.ball.gap(self.V[self.skin])
         lift -= 0.5 * (rest + np.sqrt(rest**2 + width**2))
         lift = np.maximum(lift, 0.0)
         lift[self._corner] = 0.0
-        lift[np.linalg.norm(pose[self.skin] - self.V[self.skin], axis=1) < 1e-3] = 0.0
+        lift[come < 1e-3] = 0.0
         result = pose.copy()
         outward = points - ball.center
         result[self.skin] += outward * (lift / np.linalg.norm(outward, axis=1))[:, None]

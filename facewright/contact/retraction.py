@@ -16,7 +16,6 @@ MOST_MM = 2.0
 STEP_MM = 0.1
 _WEIGHTS = 0.25, 0.5, 0.75
 _YAW_DEG = -30.0, 0.0, 30.0  # from where a blink is looked at
-_BEFORE_MM = np.arange(0.0, 5.0, 0.25)  # places before the skin where the ball could show
 _FACING = 0.05
 _AWAY_MM = 0.02
 
@@ -27,10 +26,8 @@ def needed_retraction(vertices, faces, blink, ball):
     vertices (n, 3) mm at rest, faces (m, 3) of the lids' outer skin, blink (n, 3) its delta; ball transfer's Eyeball
     returns a multiple of STEP_MM, MOST_MM at most
     """
-    rays = [_open_rays(vertices + weight * blink, faces, weight) for weight in _WEIGHTS]
-    points, weights = (np.concatenate(parts) for parts in zip(*rays))
-    near = ball.gap(points) < 0.0
-    points, weights = points[near], weights[near]
+    found = [_pierced(vertices + weight * blink, faces, ball) for weight in _WEIGHTS]
+    points, weights = np.concatenate(found), np.repeat(_WEIGHTS, [len(points) for points in found])
     back = 0.0
     while len(points) and back < MOST_MM:
         back += STEP_MM
@@ -39,18 +36,18 @@ def needed_retraction(vertices, faces, blink, ball):
     return round(back, 6)
 
 
-def _open_rays(skin, faces, weight):
-    """Places (k, 3) before what is seen of a posed skin, on the way to the beholder, and the weight (k,) of each."""
+def _pierced(skin, faces, ball):
+    """(k, 3) middles of faces and edges of a posed skin that lie in the ball, with no other skin before them."""
     corners = skin[faces]
-    samples = np.concatenate([corners.mean(axis=1), 0.5 * (corners + np.roll(corners, -1, axis=1)).reshape(-1, 3)])
+    points = np.concatenate([corners.mean(axis=1), 0.5 * (corners + np.roll(corners, -1, axis=1)).reshape(-1, 3)])
     normals = normalized(face_cross(skin, faces))
     normals = np.concatenate([normals, np.repeat(normals, 3, axis=0)])
-    scene, places = RayScene(skin, faces), []
+    inside = ball.gap(points) < 0.0
+    points, normals = points[inside], normals[inside]
+    scene, seen = RayScene(skin, faces), np.zeros(len(points), bool)
     for yaw in np.radians(_YAW_DEG):
         view = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
-        facing = normals @ view > _FACING
-        start = samples[facing]
-        open_ = ~scene.occluded(start + _AWAY_MM * view, np.broadcast_to(view, start.shape))
-        places.append((start[open_][:, None] + _BEFORE_MM[:, None] * view).reshape(-1, 3))
-    places = np.concatenate(places)
-    return places, np.full(len(places), weight)
+        facing = np.flatnonzero(normals @ view > _FACING)
+        rays = np.broadcast_to(view, (len(facing), 3))
+        seen[facing[~scene.occluded(points[facing] + _AWAY_MM * view, rays)]] = True
+    return points[seen]

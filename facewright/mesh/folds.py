@@ -14,6 +14,7 @@ _LEAST_SHARE = (
 )
 _RINGS = 3  # around folds that may give way
 _SWEEPS = 25  # between two looks at what should look where
+_STEP, _FARTHEST = 0.2, 1.5  # of an edge: how far a vertex gives way in a sweep, and in all
 
 
 def folded_by_shape(neutral, moved, faces, mask=None):
@@ -85,25 +86,37 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
     near[faces[folded]] = True
     near = dilate(near, faces, _RINGS)
     asked = np.flatnonzero(near[faces].all(axis=1))
+    edge = float(np.sqrt(2.0 * face_areas(neutral, faces[asked]).mean()))
     least = _LEAST_SHARE * face_areas(neutral, faces[asked])
     ease = np.where(near, mobility, 0.0)
-    now = np.array(moved)
+    now, best, fewest = np.array(moved), moved, len(folded)
     for _ in range(rounds):
         normals = _expected_normals(neutral, now, faces, asked)
         for _ in range(_SWEEPS):
-            if not _turn_back(now, faces[asked], normals, least, ease):
+            way = _way_back(now, faces[asked], normals, least, ease)
+            if way is None:
                 break
-        if not len(folded_by_shape(neutral, now, faces[asked])):
+            now = moved + _shortened(now + _shortened(way, _STEP * edge) - moved, _FARTHEST * edge)
+        left = len(folded_by_shape(neutral, now, faces[asked]))
+        if left < fewest:
+            best, fewest = now, left
+        if not left:
             break
-    return now
+    return best
 
 
-def _turn_back(points, faces, normals, least, ease):
-    """One sweep, in place: faces (k, 3) whose area along normals (k, 3) is under least (k,) are spread; False: none."""
+def _shortened(vectors, longest):
+    """Rows of vectors no longer than that."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors * np.minimum(1.0, longest / np.maximum(length, 1e-12))
+
+
+def _way_back(points, faces, normals, least, ease):
+    """(n, 3) steps that spread faces (k, 3) whose area along normals (k, 3) is under least (k,); None: there are none."""
     area = 0.5 * (face_cross(points, faces) * normals).sum(axis=1)
     small = np.flatnonzero(area < least)
     if not len(small):
-        return False
+        return None
     F, n = faces[small], normals[small]
     a, b, c = points[F[:, 0]], points[F[:, 1]], points[F[:, 2]]
     gradient = 0.5 * np.stack([np.cross(b - c, n), np.cross(c - a, n), np.cross(a - b, n)], axis=1)
@@ -114,5 +127,4 @@ def _turn_back(points, faces, normals, least, ease):
     total, count = np.zeros_like(points), np.zeros(len(points))
     np.add.at(total, F, (step[:, None] * w)[:, :, None] * gradient)
     np.add.at(count, F, 1.0)
-    points += total / np.maximum(count, 1.0)[:, None]
-    return bool(able.any())
+    return total / np.maximum(count, 1.0)[:, None]

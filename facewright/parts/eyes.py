@@ -29,7 +29,7 @@ class LidOptions:
     most_shift_mm   how far an iris that the scan shows may move the ball sideways and up
     """
 
-    gap_mm: float = 0.15
+    gap_mm: float = 0.22
     skin_clear_mm: float = 0.8
     most_mm: float = 4.0
     reach_mm: float = 6.0
