@@ -145,7 +145,8 @@ class _Eye:
             # The lower lid is right, it has been pushed there; the upper follows. Each round corrects what the turned
             # margins have slid along the axis.
             open_u, open_l = self.lids.opening(closed)
-            closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball)
+            slides = self.lids.slides(closed)
+            closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball, slides)
         return self._full(self.lids.flush(closed, ball), pose, ball)
 
     def _turned_both(self, direction, ball):

@@ -190,11 +190,14 @@ class Lids:
         return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
 
     def slid(self, pose, way):
-        """The pose (n, 3) with each vertex moved by (n,) mm along the axis, at the height over the ball that it has."""
+        """The pose (n, 3) with each vertex moved by (n,) mm along the axis, as far from the eye's centre as it is."""
         offset = pose - self.ball.center
-        moved = offset + way[:, None] * self.axis
-        height, now = (np.maximum(np.linalg.norm(v, axis=1), 1e-9) for v in (offset, moved))
-        return self.ball.center + moved * (height / now)[:, None]
+        along = offset @ self.axis
+        across = offset - along[:, None] * self.axis
+        radius, width = (np.maximum(np.linalg.norm(v, axis=1), 1e-9) for v in (offset, across))
+        to = along + way
+        wanted = np.sqrt(np.maximum(radius**2 - to**2, 0.0))
+        return self.ball.center + to[:, None] * self.axis + across * (wanted / width)[:, None]
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
         """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
