@@ -147,7 +147,7 @@ class _Eye:
             open_u, open_l = self.lids.opening(closed)
             slides = self.lids.slides(closed)
             closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball, slides)
-        return self._full(self.lids.flush(closed, ball), pose, ball)
+        return self._full(self.lids.joined(closed, ball), pose, ball)
 
     def _turned_both(self, direction, ball):
         """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
@@ -191,7 +191,7 @@ class _Eye:
         passing = self.options.passing_mm * (2.0 if weight == 1.0 else 1.0)
         turns = [weight * turn for turn in self._closing_turns()]
         pose = self.lids.turned(self.V, *turns, slides=slides, passing_mm=passing)
-        return self.lids.flush(pose) if weight == 1.0 else pose
+        return self.lids.joined(pose) if weight == 1.0 else pose
 
     def _wide(self, weight):
         return self._by_degrees(self.V, self.options.wide_turn_deg, weight, self.ball)

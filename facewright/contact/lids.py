@@ -22,9 +22,8 @@ from facewright.transfer.eyeball import lid_clearance
 
 _KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
 _CORNER_MM = 6.0  # around a canthus the field is evened out
-_LOOSE = 4  # margin points from a canthus on, itself included, that may give way to a fold
-_MARGIN_EASE = 0.0  # how readily these do, against skin
-_SETTLINGS, _FLUSHINGS = 3, 2
+_SETTLINGS = 3
+_ENDS_MM = 4.0  # of the closing line, over which it rises to the canthi
 _FAR_MM = 2.0
 _WAVES = 2  # of the closing line between the canthi
 
@@ -33,6 +32,7 @@ _WAVES = 2  # of the closing line between the canthi
 class LidMotionOptions:
     """upper_share   of the way to the closing line that the upper lid goes, the lower goes the rest
     gap_mm        of the margins from the ball when they move
+    closed_mm     of shut margins from the ball
     skin_clear_mm of the outer lid skin from the ball
     reach_mm      how far over the skin a margin's turn is felt: 26 would drag the brow, much less leaves an edge
     soft_mm       width over which the lift off the ball sets in
@@ -40,6 +40,7 @@ class LidMotionOptions:
 
     upper_share: float = 0.8
     gap_mm: float = 0.22
+    closed_mm: float = 0.45
     skin_clear_mm: float = 0.6
     reach_mm: float = 10.0
     soft_mm: float = 0.1
@@ -73,8 +74,6 @@ class Lids:
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
         self._ease = free.astype(float)
         self._ease[self.margin] = 0.0
-        for line in (self.upper, self.lower):
-            self._ease[line[1:_LOOSE]] = self._ease[line[-_LOOSE:-1]] = _MARGIN_EASE
 
     def angles(self, points):
         """(k,) radians of elevation of points (k, 3) about the axis, 0 straight ahead."""
@@ -119,20 +118,20 @@ class Lids:
         """(u,), (l,) mm along the axis that margin points of a pose (n, 3) need when they come to lie in one line.
 
         A corner of the eye is round: its points stand above each other, and closed they would fall together. From the
-        canthus inwards each keeps a share of its distance from the last.
+        canthus inwards each keeps a share of its distance from the last at rest.
         """
-        return [self._slides(pose[line]) for line in (self.upper, self.lower)]
+        return [self._slides(pose[line], self.V[line]) for line in (self.upper, self.lower)]
 
-    def _slides(self, chain):
+    def _slides(self, chain, rest):
         at = chain @ self.axis
         way = np.sign(at[-1] - at[0])
-        steps = _KEPT_SPACING * np.linalg.norm(np.diff(chain, axis=0), axis=1)
-        rest, slid = at * way, at * way  # from the first canthus to the last
+        steps = _KEPT_SPACING * np.linalg.norm(np.diff(rest, axis=0), axis=1)
+        from_, slid = at * way, at * way  # from the first canthus to the last
         middle = len(at) // 2
         for i in range(1, middle):
-            slid[i] = max(rest[i], slid[i - 1] + steps[i - 1])
-            slid[-1 - i] = min(rest[-1 - i], slid[-i] - steps[-i])
-        return way * (slid - rest)
+            slid[i] = max(from_[i], slid[i - 1] + steps[i - 1])
+            slid[-1 - i] = min(from_[-1 - i], slid[-i] - steps[-i])
+        return way * (slid - from_)
 
     def turned(self, pose, upper_turn, lower_turn, ball=None, slides=None, passing_mm=0.0):
         """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them.
@@ -142,7 +141,7 @@ class Lids:
         """
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
-            pose = self.slid(pose, self.field(*slides))
+            pose = pose + self.field(*slides)[:, None] * self.axis
         return self.lifted(self.rotated(pose, turns), ball, passing_mm)
 
     def field(self, upper, lower):
@@ -189,16 +188,6 @@ class Lids:
         along = (offset @ axis)[:, None] * axis
         return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
 
-    def slid(self, pose, way):
-        """The pose (n, 3) with each vertex moved by (n,) mm along the axis, as far from the eye's centre as it is."""
-        offset = pose - self.ball.center
-        along = offset @ self.axis
-        across = offset - along[:, None] * self.axis
-        radius, width = (np.maximum(np.linalg.norm(v, axis=1), 1e-9) for v in (offset, across))
-        to = along + way
-        wanted = np.sqrt(np.maximum(radius**2 - to**2, 0.0))
-        return self.ball.center + to[:, None] * self.axis + across * (wanted / width)[:, None]
-
     def lifted(self, pose, ball=None, passing_mm=0.0):
         """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
 
@@ -220,18 +209,33 @@ class Lids:
         result[self.skin] += outward * (lift / np.linalg.norm(outward, axis=1))[:, None]
         return result
 
-    def flush(self, pose, ball=None):
-        """The pose (n, 3) of closed lids with both margins equally far from the centre where they meet."""
-        for _ in range(_FLUSHINGS):
-            at = pose @ self.axis
-            radius = np.linalg.norm(pose - self.ball.center, axis=1)
-            rise = [
-                0.5 * (_along(at[own], at[other], radius[other]) - radius[own])
-                for own, other in ((self.upper, self.lower), (self.lower, self.upper))
-            ]
-            share = self.field(*rise) / radius
-            pose = self.lifted(pose + share[:, None] * (pose - self.ball.center), ball)
-        return pose
+    def joined(self, pose, ball=None):
+        """The pose (n, 3) of closed lids with both margins on one line over the ball, smooth up to the canthi.
+
+        Where the margins lie along the axis and how high they are turned is left; their distance from the centre is the
+        ball's and options.closed_mm, and runs to that of the canthi over the last millimetres.
+        """
+        ball = ball or self.ball
+        moves = []
+        for line, slide in zip((self.upper, self.lower), self.slides(pose)):
+            along, theta = pose[line] @ self.axis - ball.center @ self.axis + slide, self.angles(pose[line])
+            spokes = np.cos(theta)[:, None] * self.forward + np.sin(theta)[:, None] * self.up
+            points = pose[line]
+            for _ in range(2):  # the ball's radius is asked where the point comes to lie
+                radius = np.maximum(self._closed_radius(points, pose[self.canthi], ball), np.abs(along) + 1e-3)
+                points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
+            moves.append(points - pose[line])
+        spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
+        return self.lifted(pose + np.stack(spread, axis=1), ball)
+
+    def _closed_radius(self, points, canthi, ball):
+        """(k,) distance from the centre that closed margins have at points (k, 3)."""
+        radius = ball.surface_radius(points) + self.options.closed_mm
+        for canthus in canthi:
+            beyond = ball.gap(canthus[None])[0] - self.options.closed_mm
+            share = np.clip(1.0 - np.linalg.norm(points - canthus, axis=1) / _ENDS_MM, 0.0, 1.0)
+            radius = radius + beyond * share * share * (3.0 - 2.0 * share)
+        return radius
 
 
 def _frame(upper, lower, center):

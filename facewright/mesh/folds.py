@@ -112,7 +112,7 @@ def _shortened(vectors, longest):
 
 
 def _way_back(points, faces, normals, least, ease):
-    """(n, 3) steps that spread faces (k, 3) whose area along normals (k, 3) is under least (k,); None: there are none."""
+    """(n, 3) steps that spread faces (k, 3) whose area along normals (k, 3) is under least (k,), or None."""
     area = 0.5 * (face_cross(points, faces) * normals).sum(axis=1)
     small = np.flatnonzero(area < least)
     if not len(small):
