@@ -30,6 +30,11 @@ class RadialTable:
         far = (1 - v) * self.radii[i + 1, j] + v * self.radii[i + 1, k]
         return (1 - u) * near + u * far
 
+    def mirrored(self):
+        """The table of the mirror image in x."""
+        t = self.radii.shape[1]
+        return RadialTable(self.radii[:, (t // 2 - np.arange(t)) % t])
+
     def scaled(self, by):
         """The table of the surface scaled about its centre."""
         return RadialTable(by * self.radii)

@@ -68,8 +68,10 @@ def measure_eyeball(template, side):
 
     The radius is that of the ball's back half, where no cornea is. The axis goes through the middle of what bulges out
     most, which is the cornea. The surface is the outermost of the eye's parts; both eyes' quads count, however they are
-    cut, so that the two are mirror images.
+    cut. The left eye is measured; the right one is its mirror image to the last bit.
     """
+    if side == "right":
+        return _mirrored(measure_eyeball(template, "left"))
     center = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
     ball = template.vertices[template.part(f"eye_{side}").vertex_slice] - center
     radius = float(np.median(np.linalg.norm(ball[ball[:, 2] < 0], axis=1)))
@@ -81,11 +83,17 @@ def measure_eyeball(template, side):
     right = np.cross([0.0, 1.0, 0.0], axis)
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(axis, right), axis], axis=1)
-    other = "right" if side == "left" else "left"
-    faces = [template.faces[part.face_slice] for part in eye_parts(template, side)]
-    faces += [template.mirror[template.faces[part.face_slice]] for part in eye_parts(template, other)]
+    faces = [template.faces[part.face_slice] for part in eye_parts(template, "left")]
+    faces += [template.mirror[template.faces[part.face_slice]] for part in eye_parts(template, "right")]
     surface = radial_table((template.vertices - center) @ rotation, np.concatenate(faces), radius)
     return Eyeball(center, radius, rotation, surface)
+
+
+def _mirrored(ball):
+    """The Eyeball on the other side of x = 0."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    rotation = flip[:, None] * ball.rotation * flip
+    return replace(ball, center=flip * ball.center, rotation=rotation, surface=ball.surface.mirrored())
 
 
 def carried_eyeball(template, vertices, side):

@@ -25,7 +25,7 @@ from facewright.transfer.eyeball import carried_eyeball, measure_eyeball
 SIDES = ("left", "right")
 _ROOT_MM = 0.25  # vertices this near to the skin are roots
 _CLEAR_MM = 0.05  # of what stands off the eyeball, at least
-_LIES_MM = 0.23  # what is nearer than this lies on the eyeball and stays as near
+_LIES_MM = 0.3  # what is nearer than this lies on the eyeball and stays as near
 _NEAR_MM = 30.0  # skin this far from the eye's centre can carry roots
 
 
