@@ -1,8 +1,9 @@
 """How far eyeballs draw back in a blink, so that lids which move along straight lines pass before them.
 
 A player of the plain shapes moves lids along chords, which would cut through the cornea half way. In life the eyeball
-draws back by 1 to 2 mm in a blink (Evinger et al. 1984, "Blinking and associated eye movements"), so that is what it
-does here, by as much as the head's lids need. With in-betweens lids keep to their arc and the ball draws back at last.
+draws back by a millimetre or more in a blink (Evinger et al. 1984, "Blinking and associated eye movements in humans,
+guinea pigs, and rabbits"), so that is what it does here, by as much as the head's lids need. With in-betweens lids keep
+to their arc and the ball draws back at last.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from facewright.mesh.spread import spread_smoothly
 from facewright.transfer.eyeball import angle_from, eye_parts, lid_clearance, measure_eyeball
 
 EYE_RADIUS_MM = 12.0
-RADIUS_LIMITS_MM = (11.6, 12.4)  # one standard deviation of the axial length of grown-up eyes
+RADIUS_LIMITS_MM = (11.6, 12.4)  # grown-up eyes hardly differ by more
 _RIM_DEG, _DRAWN_IN = 38.0, 0.05
 _CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
 
@@ -38,7 +38,7 @@ class LidOptions:
 
 
 def eye_radius(template, vertices, lines):
-    """Radius of the person's eyeballs: 12 mm by the distance between the eyes against the template's, 11 to 13."""
+    """Radius of the person's eyeballs: 12 mm by the distance between the eyes against the template's, 11.6 to 12.4."""
     names = [[f"lid_upper_{side}", f"lid_lower_{side}"] for side in ("left", "right")]
     distance = []
     for V, chains in ((template.vertices, template.lines), (vertices, lines)):
