@@ -1,6 +1,7 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
 from facewright.contact.eyes import EyeShapeOptions, solve_eyes
+from facewright.contact.folds import lay_flat
 from facewright.contact.jaw import find_jaw
 from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
 from facewright.contact.neck import hold_neck
@@ -12,6 +13,7 @@ __all__ = [
     "Targets",
     "find_jaw",
     "hold_neck",
+    "lay_flat",
     "part_lips",
     "solve_eyes",
     "solve_mouth",

@@ -13,13 +13,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from facewright.contact.gaze import gaze_rotation, look_shapes, turned_ball
+from facewright.contact.gaze import gaze_rotation, look_shapes
 from facewright.contact.lids import LidMotionOptions, Lids
+from facewright.contact.retraction import needed_retraction
 from facewright.contact.targets import Targets
 from facewright.conventions import corrective_name, in_between_name
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
+_BLINK_STEPS = 0.35, 0.7, 1.0  # a lid turns farthest; chords of a third of its way stay out of the ball
 _ROUNDS = 3
 _FULLNESS = 0.6
 _CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
@@ -32,6 +34,7 @@ class EyeShapeOptions:
     look_turn_deg   direction -> degrees by which upper and lower margin follow the gaze (up is positive)
     wide_turn_deg   the same for eyeWide
     squint_share    of the opening by which eyeSquint lowers the upper and raises the lower lid
+    passing_mm      by which lids lie higher where a blink passes on its way
     free_mm         skin this far from the margins may move with the lids
     """
 
@@ -41,6 +44,7 @@ class EyeShapeOptions:
     )
     wide_turn_deg: tuple[float, float] = (12.0, -4.0)
     squint_share: tuple[float, float] = (0.10, 0.30)
+    passing_mm: float = 0.15
     free_mm: float = 14.0
 
 
@@ -50,24 +54,28 @@ def solve_eyes(face, deltas, options=None):
     names = list(face.template.shape_names)
     result = np.array(deltas)
     extras, in_betweens, correctives = {}, {}, {}
-    for side in ("left", "right"):
-        eye = _Eye(face, side, options)
+    eyes = [_Eye(face, side, options) for side in ("left", "right")]
+    for eye in eyes:
         for name, poses in eye.shapes(names, deltas).items():
-            result[names.index(name)] = poses[1.0]
-            if HALF in poses:
-                extras[in_between_name(name, HALF)] = poses[HALF]
-                in_betweens[name] = {HALF: in_between_name(name, HALF)}
-        blink = f"eyeBlink{side.capitalize()}"
-        if blink not in names:
+            result[names.index(name)] = poses.pop(1.0)
+            if poses:
+                in_betweens[name] = {weight: in_between_name(name, weight) for weight in poses}
+                extras |= {in_betweens[name][weight]: delta for weight, delta in poses.items()}
+    blinks = [result[names.index(eye.blink)] if eye.blink in names else None for eye in eyes]
+    back = max([eye.retraction(blink) for eye, blink in zip(eyes, blinks) if blink is not None], default=0.0)
+    for eye, blink in zip(eyes, blinks):
+        if blink is None:
             continue
         for other in eye.partners(names):
-            target = corrective_name((blink, other))
-            extras[target] = eye.corrective(result[names.index(blink)], result[names.index(other)], other)
-            correctives[target] = (blink, other)
+            target = corrective_name((eye.blink, other))
+            extras[target] = eye.corrective(blink, result[names.index(other)], other)
+            correctives[target] = (eye.blink, other)
         for pair in eye.diagonals(names):
             target = corrective_name(pair)
             extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
             correctives[target] = pair
+        for part in eye_parts(face.template, eye.side):
+            blink[part.vertex_slice] -= [0.0, 0.0, back]
     return Targets(tuple(names), result, extras, in_betweens, correctives)
 
 
@@ -76,6 +84,7 @@ class _Eye:
 
     def __init__(self, face, side, options):
         self.face, self.side, self.options = face, side, options
+        self.blink = f"eyeBlink{side.capitalize()}"
         skin = face.template.skin
         self.skin = skin.vertex_slice
         self.V = face.vertices[self.skin]
@@ -93,15 +102,17 @@ class _Eye:
         self.squints = (place * place * (3.0 - 2.0 * place))[:, None]
         free = (distance < options.free_mm) & ~held & ~(socket & (distance > 0.5 * options.free_mm))
         self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
+        faces = faces[: len(faces) // 2]
+        self.lid_faces = faces[(free & ~socket)[faces].all(axis=1)]
         self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
 
     def shapes(self, names, deltas):
         """shape name -> {weight: (n, 3) delta} of this eye's shapes that the template has."""
         side = self.side.capitalize()
-        made = {f"eyeBlink{side}": self._blink, f"eyeWide{side}": self._wide}
+        made = {self.blink: (self._blink, _BLINK_STEPS), f"eyeWide{side}": (self._wide, (HALF, 1.0))}
         found = {
-            name: {w: self._full(make(w), shut=make == self._blink and w == 1.0) for w in (HALF, 1.0)}
-            for name, make in made.items()
+            name: {weight: self._full(make(weight)) for weight in weights}
+            for name, (make, weights) in made.items()
             if name in names
         }
         squint = f"eyeSquint{side}"
@@ -114,6 +125,10 @@ class _Eye:
                 found[name] = {w: self._look(direction, own, w) for w in (HALF, 1.0)}
         return found
 
+    def retraction(self, blink):
+        """mm by which this eye's ball must draw back in its blink (n, 3)."""
+        return needed_retraction(self.V, self.lid_faces, blink[self.skin], self.ball)
+
     def partners(self, names):
         """Names of the shapes that need a corrective with this eye's blink."""
         side = self.side.capitalize()
@@ -124,14 +139,15 @@ class _Eye:
         """(n, 3) what blink and another shape lack together: margins that meet, skin off the turned ball."""
         pose = self.V + blink[self.skin] + other[self.skin]
         direction = look_shapes(self.side).get(name)
-        ball = turned_ball(self.ball, gaze_rotation(direction, self.side)) if direction else self.ball
+        ball = self.ball.turned(gaze_rotation(direction, self.side)) if direction else self.ball
         closed = self._turned_both(direction, ball) if direction else pose
         for _ in range(_ROUNDS):
             # The lower lid is right, it has been pushed there; the upper follows. Each round corrects what the turned
             # margins have slid along the axis.
             open_u, open_l = self.lids.opening(closed)
-            closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball)
-        return self._full(self.lids.flush(closed), pose, shut=True)
+            slides = self.lids.slides(closed)
+            closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball, slides)
+        return self._full(self.lids.joined(closed, ball), pose, ball)
 
     def _turned_both(self, direction, ball):
         """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
@@ -162,7 +178,8 @@ class _Eye:
         looks = look_shapes(self.side)
         turns = [gaze_rotation(looks[name], self.side) for name in pair]
         R = Rotation.from_rotvec(sum(Rotation.from_matrix(turn).as_rotvec() for turn in turns)).as_matrix()
-        full = self._full(self.lids.lifted(pose, turned_ball(self.ball, R)), pose)
+        ball = self.ball.turned(R)
+        full = self._full(self.lids.lifted(pose, ball), pose, ball)
         # Two turns added up as chords swell the ball: it gets the one turn that they mean.
         missing = R - turns[0] - turns[1] + np.eye(3)
         for part in eye_parts(self.face.template, self.side):
@@ -171,8 +188,10 @@ class _Eye:
 
     def _blink(self, weight):
         slides = [weight * slide for slide in self.lids.slides(self.V)]
-        pose = self.lids.turned(self.V, *(weight * turn for turn in self._closing_turns()), slides=slides)
-        return self.lids.flush(pose) if weight == 1.0 else pose
+        passing = self.options.passing_mm * (2.0 if weight == 1.0 else 1.0)
+        turns = [weight * turn for turn in self._closing_turns()]
+        pose = self.lids.turned(self.V, *turns, slides=slides, passing_mm=passing)
+        return self.lids.joined(pose) if weight == 1.0 else pose
 
     def _wide(self, weight):
         return self._by_degrees(self.V, self.options.wide_turn_deg, weight, self.ball)
@@ -192,7 +211,8 @@ class _Eye:
         R = gaze_rotation(direction, self.side, weight)
         turns = self.options.look_turn_deg[direction]
         pose = self.V if any(turns) else self.V + weight * own
-        full = self._full(self._by_degrees(pose, turns, weight, turned_ball(self.ball, R)))
+        ball = self.ball.turned(R)
+        full = self._full(self._by_degrees(pose, turns, weight, ball), ball=ball)
         for part in eye_parts(self.face.template, self.side):
             offset = self.face.vertices[part.vertex_slice] - self.ball.center
             full[part.vertex_slice] = offset @ R.T - offset
@@ -202,10 +222,10 @@ class _Eye:
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
         return self.lids.turned(pose, upper, lower, ball)
 
-    def _full(self, pose, base=None, shut=False):
-        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose; shut: its lids meet."""
+    def _full(self, pose, base=None, ball=None):
+        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose, over the ball as it lies."""
         delta = np.zeros(self.face.vertices.shape)
-        delta[self.skin] = self.lids.settled(pose, shut) - (self.V if base is None else base)
+        delta[self.skin] = self.lids.settled(pose, ball) - (self.V if base is None else base)
         delta[np.abs(delta).max(axis=1) < 1e-4] = 0.0
         return delta
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 GAZE_DEG = {"In": 30.0, "Out": 30.0, "Down": 30.0, "Up": 25.0}
@@ -25,8 +23,3 @@ def gaze_rotation(direction, side, weight=1.0):
     outward = 1.0 if side == "left" else -1.0
     s = s * (outward if direction == "Out" else -outward)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def turned_ball(ball, rotation):
-    """The Eyeball with its cornea looking elsewhere."""
-    return replace(ball, axis=rotation @ ball.axis)

@@ -15,15 +15,16 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import unique_edges
-from facewright.mesh.folds import laid_flat, neighbour_mean
+from facewright.mesh.folds import laid_flat
 from facewright.mesh.spread import SmoothSpread
 from facewright.solve.quadratic import Factorization
 from facewright.transfer.eyeball import lid_clearance
 
 _KEPT_SPACING = 0.5  # of neighbouring margin points of closed lids
 _CORNER_MM = 6.0  # around a canthus the field is evened out
-_LOOSE = 4  # margin points from a canthus on, itself included, that may be smoothed with a fold
-_JOININGS, _FLUSHINGS = 2, 2
+_SETTLINGS = 3
+_ENDS_MM = 4.0  # of the closing line, over which it rises to the canthi
+_FAR_MM = 2.0
 _WAVES = 2  # of the closing line between the canthi
 
 
@@ -31,13 +32,15 @@ _WAVES = 2  # of the closing line between the canthi
 class LidMotionOptions:
     """upper_share   of the way to the closing line that the upper lid goes, the lower goes the rest
     gap_mm        of the margins from the ball when they move
+    closed_mm     of shut margins from the ball
     skin_clear_mm of the outer lid skin from the ball
     reach_mm      how far over the skin a margin's turn is felt: 26 would drag the brow, much less leaves an edge
     soft_mm       width over which the lift off the ball sets in
     """
 
     upper_share: float = 0.8
-    gap_mm: float = 0.15
+    gap_mm: float = 0.22
+    closed_mm: float = 0.45
     skin_clear_mm: float = 0.6
     reach_mm: float = 10.0
     soft_mm: float = 0.1
@@ -68,12 +71,9 @@ class Lids:
         self._corner = np.isin(self.skin, self.canthi)
         self._corners = None
         self._near_faces = faces[free[faces].any(axis=1)]
-        self._mean = neighbour_mean(self._near_faces, len(vertices), (self.upper, self.lower))
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
-        self._keep = ~free
-        for line in (self.upper, self.lower):
-            self._keep[line[_LOOSE:-_LOOSE]] = True
-        self._keep[self.canthi] = False
+        self._ease = free.astype(float)
+        self._ease[self.margin] = 0.0
 
     def angles(self, points):
         """(k,) radians of elevation of points (k, 3) about the axis, 0 straight ahead."""
@@ -118,30 +118,31 @@ class Lids:
         """(u,), (l,) mm along the axis that margin points of a pose (n, 3) need when they come to lie in one line.
 
         A corner of the eye is round: its points stand above each other, and closed they would fall together. From the
-        canthus inwards each keeps a share of its distance from the last.
+        canthus inwards each keeps a share of its distance from the last at rest.
         """
-        return [self._slides(pose[line]) for line in (self.upper, self.lower)]
+        return [self._slides(pose[line], self.V[line]) for line in (self.upper, self.lower)]
 
-    def _slides(self, chain):
+    def _slides(self, chain, rest):
         at = chain @ self.axis
         way = np.sign(at[-1] - at[0])
-        steps = _KEPT_SPACING * np.linalg.norm(np.diff(chain, axis=0), axis=1)
-        rest, slid = at * way, at * way  # from the first canthus to the last
+        steps = _KEPT_SPACING * np.linalg.norm(np.diff(rest, axis=0), axis=1)
+        from_, slid = at * way, at * way  # from the first canthus to the last
         middle = len(at) // 2
         for i in range(1, middle):
-            slid[i] = max(rest[i], slid[i - 1] + steps[i - 1])
-            slid[-1 - i] = min(rest[-1 - i], slid[-i] - steps[-i])
-        return way * (slid - rest)
+            slid[i] = max(from_[i], slid[i - 1] + steps[i - 1])
+            slid[-1 - i] = min(from_[-1 - i], slid[-i] - steps[-i])
+        return way * (slid - from_)
 
-    def turned(self, pose, upper_turn, lower_turn, ball=None, slides=None):
+    def turned(self, pose, upper_turn, lower_turn, ball=None, slides=None, passing_mm=0.0):
         """The pose (n, 3) with its margins turned by (u,), (l,) radians (positive: up), skin with them.
 
-        slides  (u,), (l,) mm that they move along the axis besides
+        slides  (u,), (l,) mm that they slide along the axis besides
+        passing_mm  as in lifted
         """
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
             pose = pose + self.field(*slides)[:, None] * self.axis
-        return self.lifted(self.rotated(pose, turns), ball)
+        return self.lifted(self.rotated(pose, turns), ball, passing_mm)
 
     def field(self, upper, lower):
         """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
@@ -169,29 +170,15 @@ class Lids:
         result[inside] = factor.solve(-(rest @ field[~inside]))
         return result
 
-    def settled(self, pose, shut=False):
-        """The pose (n, 3) without folded faces: where the corners press skin together it is smoothed.
-
-        shut: the margins shall meet, also where they were smoothed
-        """
-        for _ in range(_JOININGS if shut else 0):
-            flat = laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
+    def settled(self, pose, ball=None):
+        """The pose (n, 3) without folded faces: where the corners press skin together it gives way, but not into the
+        ball."""
+        for _ in range(_SETTLINGS):
+            flat = laid_flat(self.V, pose, self._near_faces, self._ease)
             if flat is pose:
-                return pose
-            pose = self._joined(flat)
-        return laid_flat(self.V, pose, self._near_faces, self._keep, self._mean)
-
-    def _joined(self, pose):
-        """The pose (n, 3) with the margins' ends half way between each other."""
-        at = pose @ self.axis
-        result = pose.copy()
-        for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
-            ends = np.concatenate([own[1:_LOOSE], own[-2 : -_LOOSE - 1 : -1]])
-            across = np.stack([_along(at[ends], at[other], pose[other, i]) for i in range(3)], axis=1)
-            fading = np.tile(np.linspace(0.5, 0.1, _LOOSE - 1), 2)[:, None]
-            result[ends] += fading * (across - pose[ends])
-            result[ends] += 0.5 * (self._mean[ends] @ result - result[ends])
-        return result
+                break
+            pose = self.lifted(flat, ball)
+        return pose
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
@@ -201,36 +188,54 @@ class Lids:
         along = (offset @ axis)[:, None] * axis
         return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
 
-    def lifted(self, pose, ball=None):
-        """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be."""
+    def lifted(self, pose, ball=None, passing_mm=0.0):
+        """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
+
+        passing_mm  how much higher skin lies that has come far: it passes here on chords, to which the ball bulges
+        """
         ball = ball or self.ball
         points = pose[self.skin]
-        missing = self.clear - ball.gap(points)
+        come = np.linalg.norm(points - self.V[self.skin], axis=1)
+        missing = self.clear + passing_mm * np.minimum(come / _FAR_MM, 1.0) - ball.gap(points)
         width = self.options.soft_mm
         lift = 0.5 * (missing + np.sqrt(missing**2 + width**2))
         rest = self.clear - self.ball.gap(self.V[self.skin])
         lift -= 0.5 * (rest + np.sqrt(rest**2 + width**2))
         lift = np.maximum(lift, 0.0)
         lift[self._corner] = 0.0
-        lift[np.linalg.norm(pose[self.skin] - self.V[self.skin], axis=1) < 1e-3] = 0.0
+        lift[come < 1e-3] = 0.0
         result = pose.copy()
         outward = points - ball.center
         result[self.skin] += outward * (lift / np.linalg.norm(outward, axis=1))[:, None]
         return result
 
-    def flush(self, pose):
-        """The pose (n, 3) of closed lids with both margins equally far from the centre where they meet."""
-        result = pose
-        for _ in range(_FLUSHINGS):
-            pose = result
-            at = pose @ self.axis
-            radius = np.linalg.norm(pose - self.ball.center, axis=1)
-            result = pose.copy()
-            for own, other in ((self.upper, self.lower), (self.lower, self.upper)):
-                wanted = 0.5 * (radius[own] + _along(at[own], at[other], radius[other]))
-                offset = pose[own] - self.ball.center
-                result[own] = self.ball.center + offset * (wanted / radius[own])[:, None]
-        return result
+    def joined(self, pose, ball=None):
+        """The pose (n, 3) of closed lids with both margins on one line over the ball, smooth up to the canthi.
+
+        Where the margins lie along the axis and how high they are turned is left; their distance from the centre is the
+        ball's and options.closed_mm, and runs to that of the canthi over the last millimetres.
+        """
+        ball = ball or self.ball
+        moves = []
+        for line, slide in zip((self.upper, self.lower), self.slides(pose)):
+            along, theta = pose[line] @ self.axis - ball.center @ self.axis + slide, self.angles(pose[line])
+            spokes = np.cos(theta)[:, None] * self.forward + np.sin(theta)[:, None] * self.up
+            points = pose[line]
+            for _ in range(2):  # the ball's radius is asked where the point comes to lie
+                radius = np.maximum(self._closed_radius(points, pose[self.canthi], ball), np.abs(along) + 1e-3)
+                points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
+            moves.append(points - pose[line])
+        spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
+        return self.lifted(pose + np.stack(spread, axis=1), ball)
+
+    def _closed_radius(self, points, canthi, ball):
+        """(k,) distance from the centre that closed margins have at points (k, 3)."""
+        radius = ball.surface_radius(points) + self.options.closed_mm
+        for canthus in canthi:
+            beyond = ball.gap(canthus[None])[0] - self.options.closed_mm
+            share = np.clip(1.0 - np.linalg.norm(points - canthus, axis=1) / _ENDS_MM, 0.0, 1.0)
+            radius = radius + beyond * share * share * (3.0 - 2.0 * share)
+        return radius
 
 
 def _frame(upper, lower, center):

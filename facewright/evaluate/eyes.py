@@ -8,6 +8,7 @@ from facewright.evaluate.eye_views import EyeView
 from facewright.evaluate.play import Player
 from facewright.evaluate.rows import Row
 from facewright.mesh.closest import Surface
+from facewright.mesh.radial import radial_table
 from facewright.solve.procrustes import best_rotation
 
 CORNER_SHARE = 0.15  # of a margin at either canthus: there lies the caruncle, not the ball
@@ -160,7 +161,7 @@ def eye_meshes(rig, side):
 
 
 class LidDepth:
-    """How deep the outer lid of one eye lies in its ball, for many poses: the ball by its profile about its axis.
+    """How deep the outer lid of one eye lies in its ball, for many poses: the ball by a table of its radii.
 
     The ball is taken as turning rigidly, as it does with in-betweens and correctives.
     """
@@ -173,28 +174,18 @@ class LidDepth:
         near = np.linalg.norm(self.skin.vertices - self.center, axis=1) < NEAR_MM
         self.lid = np.flatnonzero(near & rig.regions["eyes"] & ~rig.regions[f"socket_{side}"])
         self.rest = self.ball.vertices - self.center
+        offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
         whole = np.concatenate([mesh.vertices for mesh in meshes]) - self.center
-        radii = np.linalg.norm(whole, axis=1)
-        bulge = np.maximum(radii - np.median(radii[whole[:, 2] < 0]), 0.0) * (whole[:, 2] > 0)
-        axis = (bulge**2) @ (whole / radii[:, None])
-        length = np.linalg.norm(axis)
-        self.axis = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])
-        angle = np.arccos(np.clip(whole @ self.axis / radii, -1.0, 1.0))
-        edges = np.radians(np.arange(0, 181, 3))
-        profile = np.zeros(len(edges) - 1)
-        np.maximum.at(profile, np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2), radii)
-        seen = profile > 0
-        self.angles, self.profile = 0.5 * (edges[1:] + edges[:-1])[seen], profile[seen]
+        faces = np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, offsets)])
+        self.surface = radial_table(whole, faces, otherwise=0.0)
 
     def __call__(self, play, skin, weights):
         """mm; skin (n, 3) the posed skin"""
-        axis = self.axis
-        if any(name.startswith("eyeLook") for name in weights):
-            axis = best_rotation(self.rest, play(self.ball, weights) - self.center) @ axis
         offset = skin[self.lid] - self.center
-        length = np.linalg.norm(offset, axis=1)
-        angle = np.arccos(np.clip(offset @ axis / length, -1.0, 1.0))
-        return float(np.maximum(np.interp(angle, self.angles, self.profile) - length, 0.0).max())
+        turned = offset
+        if any(name.startswith("eyeLook") for name in weights):
+            turned = offset @ best_rotation(self.rest, play(self.ball, weights) - self.center)
+        return float(np.maximum(self.surface(turned) - np.linalg.norm(offset, axis=1), 0.0).max())
 
 
 class _Ball:

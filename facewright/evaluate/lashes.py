@@ -8,9 +8,10 @@ from facewright.evaluate.eyes import eye_poses
 from facewright.evaluate.play import Player
 from facewright.evaluate.rows import Row
 from facewright.evaluate.shapes import shape_names
+from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.closest import Surface, interpolate
 
-ROOT_MM = 0.05  # a vertex of a lash this near to the skin at rest is a root
+ROOT_MM = 0.05  # this near to the skin at rest are roots, where neighbours are as near: a lone tip only touches it
 LASH_BAR_MM = 0.2
 STEPS = (0.25, 0.5, 0.75, 1.0)
 
@@ -51,7 +52,9 @@ class _Lashes:
     def __init__(self, rig, mesh):
         self.rig, self.mesh, self.skin = rig, mesh, rig.meshes[0]
         found = Surface(self.skin.vertices, self.skin.faces).closest(mesh.vertices)
-        self.roots = np.flatnonzero(found.distance <= ROOT_MM)
+        near = found.distance <= ROOT_MM
+        edges = unique_edges(mesh.faces)
+        self.roots = np.unique(edges[near[edges].all(axis=1)])
         self.faces, self.barycentric = found.faces[self.roots], found.barycentric[self.roots]
 
     def off_mm(self, weights):

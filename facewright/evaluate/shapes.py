@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.conventions import INTERPUPILLARY_MM, mirrored_name
+from facewright.evaluate.eyes import margin_gap_mm
 from facewright.evaluate.play import Player
 from facewright.evaluate.quality import torn_edges
 from facewright.evaluate.rows import Row
@@ -18,6 +19,7 @@ SWAPPED = {"jawLeft": "jawRight", "mouthLeft": "mouthRight"}
 MOVES_MM = 0.1
 MIRROR_BAR_MM = 0.01
 BASES = {"mouthClose": "jawOpen", "tongueOut": "jawOpen"}
+EYE_OPENING_MM = 11.0  # of the eye that a blink's amplitude is said of: a lid goes no farther than its eye is open
 _STILL_MM = 1e-4
 
 
@@ -127,7 +129,10 @@ def stray_mm(rig):
 
 
 def amplitudes(rig):
-    """shape -> how far it goes at weight 1, measured where working_set.Word.at says; gaze is left to evaluate.eyes."""
+    """shape -> how far it goes at weight 1, measured where working_set.Word.at says; gaze is left to evaluate.eyes.
+
+    In mm at 63 mm between the eyes; a lid's margin in mm of an eye that opens EYE_OPENING_MM.
+    """
     words, play = read_working_set().words, Player(rig, full=True)
     skin, scale = rig.meshes[0], eye_scale(rig)
     tongue = [mesh for mesh in rig.meshes if mesh.name == "tongue"]
@@ -139,7 +144,9 @@ def amplitudes(rig):
         mesh = tongue[0] if word.at == "tongue" else skin
         motion = np.linalg.norm(play(mesh, {name: 1.0}) - mesh.vertices, axis=1) * scale
         if word.at == "margin":
-            motion = motion[rig.lines[f"lid_upper_{word.side}"]]
+            upper, lower = (rig.lines[f"lid_{lid}_{word.side}"] for lid in ("upper", "lower"))
+            opening = margin_gap_mm(skin.vertices[upper], skin.vertices[lower])
+            motion = motion[upper] * (EYE_OPENING_MM / (scale * opening))
         elif word.at == "corner":
             seam = rig.lines["lip_seam_upper"]  # from the person's right to the left
             motion = motion[[seam[-1] if word.side == "left" else seam[0]]]

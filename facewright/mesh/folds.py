@@ -6,12 +6,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from facewright.mesh.adjacency import dilate, vertex_adjacency
-from facewright.mesh.normals import face_normals
+from facewright.mesh.normals import face_areas, face_cross, face_normals
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
-
-_PATIENCE = 5
-_AROUND = 9  # rings around folds that smoothing may reach
+_LEAST_SHARE = (
+    0.1  # of its area at rest that a face keeps, seen along the normal it should have, where folds are undone
+)
+_RINGS = 3  # around folds that may give way
+_SWEEPS = 25  # between two looks at what should look where
+_STEP, _FARTHEST = 0.2, 1.5  # of an edge: how far a vertex gives way in a sweep, and in all
 
 
 def folded_by_shape(neutral, moved, faces, mask=None):
@@ -24,6 +27,12 @@ def folded_by_shape(neutral, moved, faces, mask=None):
     asked = np.flatnonzero(turned if mask is None else turned & mask)
     if not len(asked):
         return asked
+    expected = _expected_normals(neutral, moved, faces, asked)
+    return asked[(expected * face_normals(moved, faces[asked])).sum(axis=1) < 0]
+
+
+def _expected_normals(neutral, moved, faces, asked):
+    """(k, 3) normals of the faces `asked` at rest, turned as what is around each has turned."""
     touched = np.zeros(len(neutral), bool)
     touched[faces[asked]] = True
     covariance = _vertex_covariance(neutral, moved, faces[touched[faces].any(axis=1)])
@@ -31,8 +40,7 @@ def folded_by_shape(neutral, moved, faces, mask=None):
     U, _, Vt = np.linalg.svd(around)
     flip = np.linalg.det(U @ Vt) < 0
     U[flip, :, 2] *= -1
-    expected = np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces[asked]))
-    return asked[(expected * face_normals(moved, faces[asked])).sum(axis=1) < 0]
+    return np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces[asked]))
 
 
 def _vertex_covariance(neutral, moved, faces):
@@ -64,37 +72,59 @@ def neighbour_mean(faces, n, lines=()):
     return (sp.diags(1.0 / np.maximum(np.asarray(W.sum(axis=1)).ravel(), 1.0)) @ W).tocsr()
 
 
-def laid_flat(neutral, moved, faces, keep, mean, *, rounds=40, step=0.5):
-    """Vertices (n, 3) of a pose in which folded faces are smoothed with their neighbours until none is left.
+def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
+    """Vertices (n, 3) of a pose in which folded faces are turned back, moving as little as that takes.
 
-    keep (n,) bool: vertices that stay; mean: neighbour_mean of the mesh. A round moves each vertex of a fold by `step`
-    of its way to the middle of its neighbours. Where nothing is folded, moved itself is returned
+    Each face around a fold keeps a tenth of its area, seen along the normal that it should have; what is missing is
+    shared out among its corners by the area's gradient, again and again (position-based constraints: Mueller et al.
+    2007). mobility (n,) 0..1: how readily a vertex gives way. Where nothing is folded, moved itself is returned
     """
-    loose = ~keep[faces].all(axis=1)
-    folded = folded_by_shape(neutral, moved, faces, loose)
+    folded = folded_by_shape(neutral, moved, faces, mobility[faces].any(axis=1))
     if not len(folded):
         return moved
     near = np.zeros(len(moved), bool)
     near[faces[folded]] = True
-    near = dilate(near, faces, _AROUND)
-    used, local = np.unique(faces[near[faces].all(axis=1)], return_inverse=True)
-    local = local.reshape(-1, 3)
-    stays = keep[used] | ~_surrounded(mean, near)[used]
-    weights, rest, now = mean[used][:, used], neutral[used], moved[used]
-    loose = ~stays[local].all(axis=1)
-    for number in range(rounds):
-        folded = folded_by_shape(rest, now, local, loose)
-        if not len(folded):
+    near = dilate(near, faces, _RINGS)
+    asked = np.flatnonzero(near[faces].all(axis=1))
+    edge = float(np.sqrt(2.0 * face_areas(neutral, faces[asked]).mean()))
+    least = _LEAST_SHARE * face_areas(neutral, faces[asked])
+    ease = np.where(near, mobility, 0.0)
+    now, best, fewest = np.array(moved), moved, len(folded)
+    for _ in range(rounds):
+        normals = _expected_normals(neutral, now, faces, asked)
+        for _ in range(_SWEEPS):
+            way = _way_back(now, faces[asked], normals, least, ease)
+            if way is None:
+                break
+            now = moved + _shortened(now + _shortened(way, _STEP * edge) - moved, _FARTHEST * edge)
+        left = len(folded_by_shape(neutral, now, faces[asked]))
+        if left < fewest:
+            best, fewest = now, left
+        if not left:
             break
-        knot = np.zeros(len(used), bool)
-        knot[local[folded]] = True
-        knot = dilate(knot, local, 1 + number // _PATIENCE) & ~stays  # what resists is smoothed with more around it
-        now[knot] += step * (weights[knot] @ now - now[knot])
-    result = np.array(moved)
-    result[used] = now
-    return result
+    return best
 
 
-def _surrounded(mean, mask):
-    """(n,) bool: vertices all of whose neighbours are in a mask (n,)."""
-    return np.asarray((mean != 0) @ (~mask).astype(float)).ravel() == 0
+def _shortened(vectors, longest):
+    """Rows of vectors no longer than that."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors * np.minimum(1.0, longest / np.maximum(length, 1e-12))
+
+
+def _way_back(points, faces, normals, least, ease):
+    """(n, 3) steps that spread faces (k, 3) whose area along normals (k, 3) is under least (k,), or None."""
+    area = 0.5 * (face_cross(points, faces) * normals).sum(axis=1)
+    small = np.flatnonzero(area < least)
+    if not len(small):
+        return None
+    F, n = faces[small], normals[small]
+    a, b, c = points[F[:, 0]], points[F[:, 1]], points[F[:, 2]]
+    gradient = 0.5 * np.stack([np.cross(b - c, n), np.cross(c - a, n), np.cross(a - b, n)], axis=1)
+    w = ease[F]
+    size = (w * (gradient**2).sum(axis=2)).sum(axis=1)
+    able = size > 1e-12
+    step = np.where(able, (least - area)[small] / np.where(able, size, 1.0), 0.0)
+    total, count = np.zeros_like(points), np.zeros(len(points))
+    np.add.at(total, F, (step[:, None] * w)[:, :, None] * gradient)
+    np.add.at(count, F, 1.0)
+    return total / np.maximum(count, 1.0)[:, None]

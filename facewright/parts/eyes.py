@@ -14,7 +14,7 @@ from facewright.mesh.spread import spread_smoothly
 from facewright.transfer.eyeball import angle_from, eye_parts, lid_clearance, measure_eyeball
 
 EYE_RADIUS_MM = 12.0
-RADIUS_LIMITS_MM = (11.0, 13.0)
+RADIUS_LIMITS_MM = (11.6, 12.4)  # grown-up eyes hardly differ by more
 _RIM_DEG, _DRAWN_IN = 38.0, 0.05
 _CORNER_SHARE = 0.15  # of a lid's length at either canthus: caruncle and corner do not lie on the ball
 
@@ -29,7 +29,7 @@ class LidOptions:
     most_shift_mm   how far an iris that the scan shows may move the ball sideways and up
     """
 
-    gap_mm: float = 0.15
+    gap_mm: float = 0.22
     skin_clear_mm: float = 0.8
     most_mm: float = 4.0
     reach_mm: float = 6.0
@@ -38,7 +38,7 @@ class LidOptions:
 
 
 def eye_radius(template, vertices, lines):
-    """Radius of the person's eyeballs: 12 mm by the distance between the eyes against the template's, 11 to 13."""
+    """Radius of the person's eyeballs: 12 mm by the distance between the eyes against the template's, 11.6 to 12.4."""
     names = [[f"lid_upper_{side}", f"lid_lower_{side}"] for side in ("left", "right")]
     distance = []
     for V, chains in ((template.vertices, template.lines), (vertices, lines)):
@@ -64,7 +64,7 @@ def place_eyeball(template, vertices, lines, side, radius, options=None, seen=No
     if seen is not None:
         pupil = center + radius * own.axis
         center[:2] += np.clip(seen - pupil[:2], -options.most_shift_mm, options.most_shift_mm)
-    ball = replace(own, center=center, radius=radius, radii=own.radii * scale)
+    ball = replace(own, center=center, radius=radius, surface=own.surface.scaled(scale))
     depth = _depths(ball, margin[inner], options.gap_mm)
     return replace(ball, center=center + [0.0, 0.0, np.median(depth)])
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.mesh.radial import RadialTable, radial_table
 from facewright.solve.procrustes import best_similarity
 
 _LEAST_BULGE = 0.02  # of the radius: an eye that bulges less than this has no cornea
@@ -15,20 +16,29 @@ _LID_SLOPE = 0.3  # how quickly a lid gains thickness away from its margin
 
 @dataclass(frozen=True)
 class Eyeball:
-    """A ball with a cornea. center (3,) mm, radius of the sclera, axis (3,) unit through the pupil.
+    """A ball with a cornea. center (3,) mm, radius of the sclera.
 
-    angles (a,) radians from the axis and radii (a,) mm there: the profile, round about the axis
+    rotation (3, 3): its own axes, as columns; the last goes through the pupil
+    surface  RadialTable in these axes: no template's eye is quite round about its pupil
     """
 
     center: np.ndarray
     radius: float
-    axis: np.ndarray
-    angles: np.ndarray
-    radii: np.ndarray
+    rotation: np.ndarray
+    surface: RadialTable
+
+    @property
+    def axis(self):
+        """(3,) unit through the pupil."""
+        return self.rotation[:, 2]
+
+    def turned(self, rotation):
+        """The Eyeball turned about its centre by (3, 3)."""
+        return replace(self, rotation=rotation @ self.rotation)
 
     def surface_radius(self, points):
         """(k,) distance of the eye's surface from its centre in the direction of points (k, 3)."""
-        return np.interp(angle_from(self.axis, points - self.center), self.angles, self.radii)
+        return self.surface((points - self.center) @ self.rotation)
 
     def gap(self, points):
         """(k,) mm from the surface to points, negative inside."""
@@ -57,8 +67,11 @@ def measure_eyeball(template, side):
     """The Eyeball of a template.
 
     The radius is that of the ball's back half, where no cornea is. The axis goes through the middle of what bulges out
-    most, which is the cornea. The profile takes the outermost vertex of any of the eye's parts in each 3 degrees.
+    most, which is the cornea. The surface is the outermost of the eye's parts; both eyes' quads count, however they are
+    cut. The left eye is measured; the right one is its mirror image to the last bit.
     """
+    if side == "right":
+        return _mirrored(measure_eyeball(template, "left"))
     center = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
     ball = template.vertices[template.part(f"eye_{side}").vertex_slice] - center
     radius = float(np.median(np.linalg.norm(ball[ball[:, 2] < 0], axis=1)))
@@ -67,14 +80,20 @@ def measure_eyeball(template, side):
     bulge = np.maximum(distance - radius, 0.0) * (offset[:, 2] > 0)
     axis = (bulge**2) @ (offset / distance[:, None])
     axis = axis / np.linalg.norm(axis) if bulge.max() > _LEAST_BULGE * radius else np.array([0.0, 0.0, 1.0])
-    angle = angle_from(axis, offset)
-    edges = np.radians(np.arange(0, 181, 3) - 1e-3)  # rings of vertices at whole degrees must not lie on an edge
-    bins = np.clip(np.digitize(angle, edges) - 1, 0, len(edges) - 2)
-    outermost = np.zeros(len(edges) - 1)
-    np.maximum.at(outermost, bins, distance)
-    seen = outermost > 0
-    middles = 0.5 * (edges[:-1] + edges[1:])
-    return Eyeball(center, radius, axis, middles[seen], np.maximum(outermost[seen], radius))
+    right = np.cross([0.0, 1.0, 0.0], axis)
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(axis, right), axis], axis=1)
+    faces = [template.faces[part.face_slice] for part in eye_parts(template, "left")]
+    faces += [template.mirror[template.faces[part.face_slice]] for part in eye_parts(template, "right")]
+    surface = radial_table((template.vertices - center) @ rotation, np.concatenate(faces), radius)
+    return Eyeball(center, radius, rotation, surface)
+
+
+def _mirrored(ball):
+    """The Eyeball on the other side of x = 0."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    rotation = flip[:, None] * ball.rotation * flip
+    return replace(ball, center=flip * ball.center, rotation=rotation, surface=ball.surface.mirrored())
 
 
 def carried_eyeball(template, vertices, side):
@@ -83,11 +102,7 @@ def carried_eyeball(template, vertices, side):
     part = template.part(f"eye_{side}").vertex_slice
     R, scale, t = best_similarity(template.vertices[part], vertices[part])
     return replace(
-        own,
-        center=scale * R @ own.center + t,
-        radius=scale * own.radius,
-        axis=R @ own.axis,
-        radii=scale * own.radii,
+        own.turned(R), center=scale * R @ own.center + t, radius=scale * own.radius, surface=own.surface.scaled(scale)
     )
 
 

@@ -7,7 +7,7 @@ pushed outwards along the ray from the eye's centre, as a smooth function of its
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -83,7 +83,7 @@ class _Gaps:
         if not self.deltas[shape, part].any():
             return self.ball
         R = best_rotation(self.vertices[part], self.vertices[part] + self.deltas[shape, part])
-        return replace(self.ball, axis=R @ self.ball.axis)
+        return self.ball.turned(R)
 
 
 def _lid_vertices(face, side):

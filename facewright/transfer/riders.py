@@ -25,7 +25,7 @@ from facewright.transfer.eyeball import carried_eyeball, measure_eyeball
 SIDES = ("left", "right")
 _ROOT_MM = 0.25  # vertices this near to the skin are roots
 _CLEAR_MM = 0.05  # of what stands off the eyeball, at least
-_LIES_MM = 0.23  # what is nearer than this lies on the eyeball and stays as near
+_LIES_MM = 0.3  # what is nearer than this lies on the eyeball and stays as near
 _NEAR_MM = 30.0  # skin this far from the eye's centre can carry roots
 
 
@@ -116,16 +116,17 @@ def ride_on_lids(face, deltas, names, correctives=None):
             pose = deltas[number] + sum(deltas[driver] for driver in drivers)
             moved = rest
             if pose.any():
-                moved = riders.placed(face.vertices + pose, _turned(ball, face.vertices[eye], pose[eye]))
+                moved = riders.placed(face.vertices + pose, _moved(ball, face.vertices[eye], pose[eye]))
             result[number, riders.index] = moved - rest - sum(result[driver, riders.index] for driver in drivers)
     return result
 
 
-def _turned(ball, points, delta):
+def _moved(ball, points, delta):
     """The Eyeball when its mesh's points (k, 3) move by delta (k, 3)."""
     if not delta.any():
         return ball
-    return replace(ball, axis=best_rotation(points, points + delta) @ ball.axis)
+    R, middle = best_rotation(points, points + delta), points.mean(axis=0)
+    return replace(ball.turned(R), center=middle + delta.mean(axis=0) + R @ (ball.center - middle))
 
 
 def _carriers(points, faces, distance):

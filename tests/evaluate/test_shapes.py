@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from facewright.evaluate.blends import possible, random_blends, random_mixes
+from facewright.evaluate.eyes import margin_gap_mm
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.rows import Row, worst_rows
-from facewright.evaluate.shapes import amplitudes, measure_shapes, mirror_mm, stray_mm
+from facewright.evaluate.shapes import EYE_OPENING_MM, amplitudes, measure_shapes, mirror_mm, stray_mm
 from facewright.parts import build_rig
 from facewright.working_set import read_working_set
 
@@ -51,10 +52,11 @@ def test_motion_beyond_the_region_is_stray(rig):
     found = stray_mm(with_delta(rig, "browInnerUp", delta))
     assert found["browInnerUp"] == pytest.approx(2.0, rel=0.05)
     lid = np.zeros_like(skin.vertices)
-    lid[rig.lines["lid_upper_left"]] = [0.0, -9.5, 0.0]
+    upper, lower = (skin.vertices[rig.lines[f"lid_{lid}_left"]] for lid in ("upper", "lower"))
+    lid[rig.lines["lid_upper_left"]] = [0.0, -margin_gap_mm(upper, lower), 0.0]
     moved = with_delta(rig, "eyeBlinkLeft", lid)
     assert stray_mm(moved)["eyeBlinkLeft"] == 0.0
-    assert amplitudes(moved)["eyeBlinkLeft"] == pytest.approx(9.5, rel=0.05)
+    assert amplitudes(moved)["eyeBlinkLeft"] == pytest.approx(EYE_OPENING_MM)  # all the way that the eye is open
 
 
 def test_left_on_the_right_side_is_no_mirror_image(rig, hm08):

@@ -47,9 +47,9 @@ def test_gap_and_pushing_are_inverse(hm08):
 
 def test_a_wider_face_has_slightly_larger_eyes_within_limits(hm08):
     assert eye_radius(hm08, hm08.vertices, hm08.lines) == pytest.approx(12.0)
-    assert eye_radius(hm08, 1.05 * hm08.vertices, hm08.lines) == pytest.approx(12.6)
-    assert eye_radius(hm08, 2 * hm08.vertices, hm08.lines) == 13.0
-    assert eye_radius(hm08, 0.5 * hm08.vertices, hm08.lines) == 11.0
+    assert eye_radius(hm08, 1.02 * hm08.vertices, hm08.lines) == pytest.approx(12.24)
+    assert eye_radius(hm08, 2 * hm08.vertices, hm08.lines) == 12.4
+    assert eye_radius(hm08, 0.5 * hm08.vertices, hm08.lines) == 11.6
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -60,7 +60,7 @@ def test_the_ball_sits_behind_the_lids_and_the_lids_on_it(hm08, hm08_person, see
     ball = place_eyeball(hm08, face.vertices, face.lines, side, radius)
     assert abs(np.median(ball.gap(inner_margin(face.vertices, face.lines, side))) - 0.15) < 0.1
     V, stats = fit_lids(hm08, face.vertices, face.regions, face.lines, side, ball)
-    assert np.abs(ball.gap(inner_margin(V, face.lines, side)) - 0.15).max() < 0.01
+    assert np.abs(ball.gap(inner_margin(V, face.lines, side)) - 0.22).max() < 0.01
     moved = np.linalg.norm(V - face.vertices, axis=1)
     may_move = face.regions["eyes"] | face.regions[f"socket_{side}"]
     assert not moved[~may_move].any() and moved.max() < 2.5 and stats["margin_moved_mm"] <= 1.6 + 1e-9

@@ -62,4 +62,4 @@ def test_the_carried_eyeball_is_the_one_in_the_vertices(hm08):
     V = 1.1 * hm08.vertices + [1, 2, 3]
     own, carried = measure_eyeball(hm08, "right"), carried_eyeball(hm08, V, "right")
     assert np.allclose(carried.center, 1.1 * own.center + [1, 2, 3]) and carried.radius == pytest.approx(13.2)
-    assert np.allclose(carried.axis, own.axis) and np.allclose(carried.radii, 1.1 * own.radii)
+    assert np.allclose(carried.axis, own.axis) and np.allclose(carried.surface.radii, 1.1 * own.surface.radii)

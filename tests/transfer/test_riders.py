@@ -37,7 +37,7 @@ def test_at_rest_they_are_where_the_template_has_them(hm08, riders):
 def test_they_turn_with_the_lids(hm08, riders):
     ball = measure_eyeball(hm08, "left")
     vertices, R = turned(hm08, 25.0)
-    placed = riders.placed(vertices, replace(ball, axis=R @ ball.axis))
+    placed = riders.placed(vertices, ball.turned(R))
     np.testing.assert_allclose(placed, vertices[riders.index], atol=1e-6)
 
 
@@ -57,7 +57,7 @@ def test_strips_keep_off_a_cornea_that_turns(hm08, itself):
     deltas[0, eye] = (hm08.vertices[eye] - ball.center) @ (R - np.eye(3)).T
     moved = hm08.vertices + ride_on_lids(itself, deltas, ("eyeLookUpLeft",))[0]
     strip = hm08.part("occlusion_left").vertex_slice
-    assert replace(ball, axis=R @ ball.axis).gap(moved[strip]).min() > 0.04
+    assert ball.turned(R).gap(moved[strip]).min() > 0.04
 
 
 def test_a_corrective_takes_what_its_drivers_left(hm08, itself):
