@@ -12,7 +12,7 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
-from facewright.contact import Targets, find_jaw, hold_neck, part_lips, solve_eyes, solve_mouth
+from facewright.contact import Targets, find_jaw, hold_neck, lay_tongue, part_lips, solve_eyes, solve_mouth
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
@@ -237,9 +237,8 @@ def _parts(run, scan, face, template):
 
 def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
-    skin = solve_mouth(
-        face, solve_eyes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face)))), jobs=jobs
-    )
+    carried = hold_neck(face, keep_within_regions(face, transfer_shapes(face)))
+    skin = solve_mouth(face, solve_eyes(face, lay_tongue(face, carried)), jobs=jobs)
     return _with_riders(face, skin)
 
 

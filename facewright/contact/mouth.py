@@ -10,7 +10,14 @@ import numpy as np
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
-from facewright.conventions import MOUTH_PAIRS, corrective_name, in_between_name, mirrored_name
+from facewright.conventions import (
+    MOUTH_PAIRS,
+    SHUT_PAIRS,
+    SHUT_SHAPES,
+    corrective_name,
+    in_between_name,
+    mirrored_name,
+)
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
 
@@ -92,10 +99,12 @@ class _Mouth:
         self.seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
         rows = [part for part in template.parts if part.name.startswith("teeth")]
         teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]
-        self.contact = LipContact(face.vertices, self.faces, self.seams, face.regions["outer"], teeth, options.lips)
         skull = face.regions["skull"]
         still = skull if skull.any() else face.regions["outer"]
-        self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
+        axes = best_rotation(template.vertices[still], face.vertices[still]).T
+        self.forward = axes[2]
+        outer = face.regions["outer"]
+        self.contact = LipContact(face.vertices, self.faces, self.seams, outer, teeth, axes, options.lips)
         share = np.clip(0.5 + template.vertices[:, 0] / options.window_mm, 0.0, 1.0)
         self.left = (share * share * (3 - 2 * share))[:, None]
 
@@ -201,9 +210,21 @@ class _Mouth:
         motion = np.abs(targets.deltas[:, self.contact.lips]).max(axis=(1, 2))
         return [name for name, most in zip(targets.names, motion) if most > _MOVES_MM and name != "mouthClose"]
 
-    def _lack(self, targets, pose, **how):
-        """(n, 3) what a pose lacks along its way; how: as LipContact.apart takes it."""
-        return self.contact.apart(lambda weight: targets.motion(_scaled(pose, weight)), **how)
+    def _lack(self, targets, pose, weights=None, acts=None, closed=False):
+        """(n, 3) what a pose lacks along its way; weights, acts, closed as LipContact.apart takes them."""
+
+        def motion(weight):
+            return targets.motion(_scaled(pose, weight))
+
+        if not _stays_shut(pose):
+            return self.contact.apart(motion, weights, acts, closed)
+        act = acts or (lambda weight: weight)
+        shut = self.contact.shut(motion, weights, acts)
+
+        def shut_motion(weight):
+            return motion(weight) + act(weight) * shut
+
+        return shut + self.contact.apart(shut_motion, weights, acts, closed, shut=True)
 
     def _corrected(self, targets, pose, shares, **how):
         """Targets after the contact of a pose has been solved along its way; shares: name -> its part of the result."""
@@ -237,6 +258,12 @@ def _hat(weight):
 
 def _scaled(weights, by):
     return {name: weight * by for name, weight in weights.items()}
+
+
+def _stays_shut(pose):
+    """Whether lips that are shut stay so under a pose: dict shape -> weight."""
+    names = {name if name in SHUT_SHAPES else name.removesuffix("Left").removesuffix("Right") for name in pose}
+    return names <= set(SHUT_SHAPES) or names in map(set, SHUT_PAIRS)
 
 
 def _sides(name, names):

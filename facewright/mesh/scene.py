@@ -33,6 +33,7 @@ class Drawable:
     normal_map (h, w, 3) uint8, tangent space, +Y; both with uv (t, 2), v up, and uv_faces (m, 3)
     roughness  0..1: below about 0.5 a highlight shows
     opacity    0..1
+    shade      (n,) share of the light that comes so deep
     normals    (n, 3), default area-weighted vertex normals
     """
 
@@ -45,6 +46,7 @@ class Drawable:
     uv_faces: np.ndarray | None = None
     roughness: float = 0.7
     opacity: float = 1.0
+    shade: np.ndarray | None = None
     normals: np.ndarray | None = None
 
 
@@ -60,8 +62,11 @@ class Scene:
         self.first_face = np.cumsum([0] + [len(d.faces) for d in self.drawables])
         normals = [_normals(d) for d in self.drawables]
         colors = [_vertex_colors(d) for d in self.drawables]
-        self._normals_colors = np.concatenate(
-            [np.concatenate(normals), np.concatenate(colors)], axis=1, dtype=np.float32
+        shades = [np.ones(len(d.vertices)) if d.shade is None else d.shade for d in self.drawables]
+        self._looks_at = np.concatenate(
+            [np.concatenate(normals), np.concatenate(colors), np.concatenate(shades)[:, None]],
+            axis=1,
+            dtype=np.float32,
         )
         self._looks = [_Looks(d, normal) for d, normal in zip(self.drawables, normals)]
 
@@ -115,8 +120,8 @@ class Scene:
 
     def _shade(self, face, barycentric, camera, pixel_mm, unlit):
         """Linear colours (k, 3) and opacities (k,) at hits."""
-        mixed = _mix(self._normals_colors, self.faces[face], barycentric)
-        normal, color = normalized(mixed[:, :3]), mixed[:, 3:]
+        mixed = _mix(self._looks_at, self.faces[face], barycentric)
+        normal, color, shade = normalized(mixed[:, :3]), mixed[:, 3:6], mixed[:, 6:]
         opacity = np.ones(len(face), np.float32)
         gloss = np.zeros(len(face), np.float32)
         owner = np.searchsorted(self.first_face, face, side="right") - 1
@@ -134,7 +139,7 @@ class Scene:
                     normal[chosen] = looks.bent(normal[chosen], local, barycentric[chosen], uv, pixel_mm)
         if unlit:
             return color, opacity
-        return _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
+        return shade * _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
 
 
 class _Looks:

@@ -31,6 +31,8 @@ HEAT_LIMIT_MM = 0.5
 HEAT_STOPS = np.array([(38, 52, 92), (46, 132, 140), (236, 212, 110), (206, 58, 48)], float)
 NOT_SEEN = (88, 88, 94)
 INNER_SHADE = 0.45
+MOUTH_LIGHT_MM = 18.0  # behind the lips, where half of the light is left
+BEHIND_LIPS = ("teeth_", "gums_", "tongue")
 CLAY_MAP_PX = 256
 
 
@@ -150,33 +152,47 @@ def scan_drawables(scan, textured):
 
 def rig_drawables(rig, textured, targets=()):
     """A Drawable per mesh of the rig under targets at weight 1. Clay keeps the colours of eyes, teeth and tongue."""
-    drawables = []
+
+    def moved(mesh):
+        return mesh.vertices + sum(mesh.deltas[t] for t in targets) if targets and mesh.deltas is not None else mesh.vertices
+
+    skin, drawables = moved(rig.meshes[0]), []
     for mesh in rig.meshes:
         material = mesh.material
         if material.alpha < 0.05 or (not textured and material.alpha < 0.9):
             continue
-        vertices = mesh.vertices
-        if targets and mesh.deltas is not None:
-            vertices = vertices + sum(mesh.deltas[target] for target in targets)
+        vertices = moved(mesh)
         looks = {"color": material.color, "roughness": material.roughness, "opacity": material.alpha}
         if textured:
             maps = {"texture": rig.maps.get(material.albedo), "normal_map": rig.maps.get(material.normal)}
             looks |= {**maps, "uv": mesh.uv, "uv_faces": mesh.uv_faces}
         elif mesh is rig.meshes[0]:
-            looks = {"color": _clay_with_dark_inside(rig)}
+            looks = {"color": _clay_with_dark_inside(rig, vertices)}
         elif material.albedo in rig.maps:
             looks |= {"texture": rig.maps[material.albedo], "uv": mesh.uv, "uv_faces": mesh.uv_faces}
+        if not textured and mesh.name.startswith(BEHIND_LIPS):
+            looks["shade"] = _shade(rig, skin, vertices)
         drawables.append(Drawable(vertices, mesh.faces, **looks))
     return drawables
 
 
-def _clay_with_dark_inside(rig):
+def _clay_with_dark_inside(rig, vertices):
     """(n, 3) linear clay, darker inside mouth, sockets and nostrils, where no light would reach."""
-    color = np.tile(CLAY_LINEAR, (len(rig.meshes[0].vertices), 1))
+    color = np.tile(CLAY_LINEAR, (len(vertices), 1))
     for name in ("mouth_interior", "socket_left", "socket_right", "nostrils"):
         if name in rig.regions:
             color[rig.regions[name]] *= INNER_SHADE
+    if "mouth_interior" in rig.regions:
+        inside = rig.regions["mouth_interior"]
+        color[inside] *= _shade(rig, vertices, vertices[inside])[:, None]
     return color
+
+
+def _shade(rig, skin, points):
+    """(k,) share of the light that reaches points (k, 3) behind the lips of a posed skin (n, 3)."""
+    lips = [skin[line[len(line) // 2], 2] for name, line in rig.lines.items() if name.startswith("lip_seam")]
+    depth = np.maximum((max(lips) if lips else points[:, 2]) - points[:, 2], 0.0)
+    return 1.0 / (1.0 + (depth / MOUTH_LIGHT_MM) ** 2)
 
 
 def heat_drawable(scan, face):

@@ -1,0 +1,94 @@
+"""Lips that are shut stay shut where a shape does not open them, however it slides them along each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.mesh.adjacency import unique_edges
+from facewright.mesh.spread import SoftSpread
+
+_PIN = 100.0  # weight of a wish against 1 mm2 of bending
+
+
+@dataclass(frozen=True)
+class ShutOptions:
+    """overlap_mm by which one lip covers the other as seen from the front
+    touch_mm   a slit narrower than this is none
+    inside_mm  behind the seam: lip that still counts as seen
+    smooth_mm  width over which a wish is felt; reach_mm over which it fades
+    rounds     of wishes
+    """
+
+    overlap_mm: float = 0.1
+    touch_mm: float = 0.05
+    inside_mm: float = 2.0
+    smooth_mm: float = 4.0
+    reach_mm: float = 9.0
+    rounds: int = 5
+
+
+class LipSlit:
+    """The slit between the lips of one head, looked at from the front.
+
+    vertices (n, 3) of the surroundings of the lips at rest, faces (m, 3); patches: faces of the upper and the lower lip
+    seams    the two lines, paired; outer (n,) bool; free (n,) bool: skin that may follow
+    axes     (3, 3) rows: where left, up and forward are for this head
+    """
+
+    def __init__(self, vertices, faces, patches, seams, outer, free, axes, options=None):
+        self.options = options or ShutOptions()
+        self.seams, self.axes = seams, axes
+        seam = np.unique(np.concatenate(seams))
+        shown = outer | (cKDTree(vertices[seam]).query(vertices)[0] < self.options.inside_mm)
+        self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
+        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm)
+        self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]
+
+    def gaps(self, skin):
+        """(k,) of each line of a pose (n, 3): height in mm of the slit at its inner vertices, less than 0: covered."""
+        x, y = skin @ self.axes[0], skin @ self.axes[1]
+        result = []
+        for line in self.seams:
+            at = x[line[1:-1]]
+            low = -_highest(at, x, -y, self._edges[0])  # the upper lip's lower edge
+            high = _highest(at, x, y, self._edges[1])
+            result.append(np.where(np.isfinite(low) & np.isfinite(high), low - high, -np.inf))
+        return result
+
+    def wishes(self, skin):
+        """(n, 3) what shuts the slit of a pose (n, 3), half and half, and (n,) by how much it is open there, mm."""
+        move, over = np.zeros(len(skin)), np.zeros(len(skin))
+        for line, gap, rest, sign in zip(self.seams, self.gaps(skin), self._at_rest, (-1.0, 1.0)):
+            more = gap - rest
+            wish = np.where(more > self.options.touch_mm, more + self.options.overlap_mm, 0.0)
+            move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, wish
+        return move[:, None] * self.axes[1], over
+
+    def shut(self, poses, acts):
+        """(n, 3) correction that shuts the slit in poses weight -> (n, 3); acts: how strongly it acts at a weight."""
+        field = np.zeros_like(next(iter(poses.values())))
+        hold = np.zeros(len(field))
+        hold[np.concatenate(self.seams)] = 1.0
+        for _ in range(self.options.rounds):
+            total, most = np.zeros_like(field), np.zeros(len(field))
+            for weight, pose in poses.items():
+                share = acts(weight)
+                wish, over = self.wishes(pose + share * field)
+                more = over / share > most
+                total[more], most[more] = wish[more] / share, over[more] / share
+            if not most.any():
+                break
+            field = field + self._spread(total, _PIN * hold, self.options.smooth_mm)
+        return field
+
+
+def _highest(at, x, y, edges):
+    """(k,) largest y over edges (e, 2) of points (x, y) (n,) above places at (k,) of x; -inf where there is no edge."""
+    a, b = edges[:, 0], edges[:, 1]
+    span = x[b] - x[a]
+    share = (at[:, None] - x[a]) / np.where(np.abs(span) > 1e-9, span, np.inf)
+    height = y[a] + share * (y[b] - y[a])
+    return np.where((share >= 0.0) & (share <= 1.0) & (np.abs(span) > 1e-9), height, -np.inf).max(axis=1, initial=-np.inf)
