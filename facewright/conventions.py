@@ -16,6 +16,7 @@ ARKIT_SHAPES = tuple(
     cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft noseSneerRight tongueOut""".split()
 )
 
+EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
 MOUTH_PAIRS = (
     ("mouthSmile", "jawOpen"),
     ("mouthSmile", "mouthFunnel"),
@@ -24,7 +25,7 @@ MOUTH_PAIRS = (
     ("mouthRollUpper", "mouthRollLower"),
     ("mouthShrugUpper", "mouthShrugLower"),
 )
-"""Pairs of shapes that lips must survive together; a name without its side stands for both sides."""
+"""Pairs of shapes that lids and lips must survive together; a name without its side stands for both sides."""
 
 SHUT_SHAPES = tuple(
     """jawForward jawLeft jawRight mouthPucker mouthLeft mouthRight mouthSmile mouthFrown mouthDimple mouthStretch

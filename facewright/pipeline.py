@@ -14,6 +14,7 @@ from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
 from facewright.contact import Targets, find_jaw, hold_neck, lay_tongue, part_lips, solve_eyes, solve_mouth
 from facewright.conventions import ARKIT_SHAPES
+from facewright.data import Face
 from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
 from facewright.output import OutputFolder
@@ -245,6 +246,14 @@ def shapes_of(face, jobs=1):
 def rig_from_face(face, maps=None, jobs=1):
     """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
     return _assembled(face, shapes_of(face, jobs), maps)
+
+
+def template_rig(template, jobs=1):
+    """The data.Rig of a Template's own head, made as a person's is."""
+    seen, closed = np.ones(len(template.vertices), bool), {"left": False, "right": False}
+    V = template.vertices
+    face = Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})
+    return rig_from_face(part_lips(fit_parts(face)), jobs=jobs)
 
 
 def _transfer(run, face, template, jobs):

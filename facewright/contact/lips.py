@@ -92,9 +92,17 @@ class LipContact:
         self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
 
     def shut(self, motion, weights=None, acts=None):
-        """(n, 3) correction of a motion so that no slit opens between the lips along it; arguments as of apart."""
-        poses = {weight: (self.V + motion(weight))[self.used] for weight in weights or self.options.weights}
-        return self._of_head(self.slit.shut(poses, acts or (lambda weight: weight)))
+        """(n, 3) correction of a motion so that no slit is open between the lips where the correction acts most.
+
+        Arguments as of apart. Less than whole a slit opens as the motion does, but a pair's corrective acts as the
+        square of that: what shut it half way would be twice too much at the end.
+        """
+        weight = self._where_it_acts_most(weights, acts)
+        skin = (self.V + motion(weight))[self.used]
+        return self._of_head(self.slit.shut(skin) / (acts(weight) if acts else weight))
+
+    def _where_it_acts_most(self, weights, acts):
+        return max(weights or self.options.weights, key=acts or (lambda weight: weight))
 
     def apart(self, motion, weights=None, acts=None, closed=False, shut=False):
         """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
@@ -107,6 +115,7 @@ class LipContact:
         """
         field = np.zeros((len(self.used), 3))
         hold = np.zeros(len(self.used))
+        most_weight = self._where_it_acts_most(weights, acts)
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
         asked = list(poses)
         for width in _LOCAL_MM if closed else self.options.smooth_mm:
@@ -117,7 +126,7 @@ class LipContact:
                 wishes, heeded = self._wishes(skin, poses[weight])
                 if closed:
                     self._add_closing(skin, wishes, heeded)
-                if shut:
+                if shut and weight == most_weight:
                     self._add_shutting(skin, wishes, heeded)
                 size = np.linalg.norm(wishes, axis=1) / share
                 more = size > most

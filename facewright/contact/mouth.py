@@ -79,6 +79,7 @@ def solve_mouth(face, targets, options=None, jobs=1):
     result = mouth.with_halves(result)
     result = mouth.with_mouth_close(result)
     result = mouth.with_pairs(result)
+    result = mouth.with_tongue(result)
     return result.evened(face.template.mirror) if _is_even(face) else result
 
 
@@ -176,6 +177,20 @@ class _Mouth:
             for drivers, share in self._shared(sides):
                 name = corrective_name(drivers)
                 extras[name], correctives[name] = share * lack, drivers
+        return replace(targets, extras=extras, correctives=correctives)
+
+    def with_tongue(self, targets):
+        """Targets with a corrective for a tongue that comes out of an open mouth: it parts the teeth by itself, and both
+        together would open the jaw farther than it goes."""
+        parts = [part for part in self.face.template.parts if part.name == "teeth_lower"]
+        if not parts or not {"jawOpen", "tongueOut"} <= set(targets.names):
+            return targets
+        teeth = parts[0].vertex_slice
+        opened, out = targets.delta("jawOpen"), targets.delta("tongueOut")
+        share = np.vdot(out[teeth], opened[teeth]) / max(np.vdot(opened[teeth], opened[teeth]), 1e-12)
+        drivers = ("jawOpen", "tongueOut")
+        name = corrective_name(drivers)
+        extras, correctives = targets.extras | {name: -share * opened}, targets.correctives | {name: drivers}
         return replace(targets, extras=extras, correctives=correctives)
 
     def with_halves(self, targets):

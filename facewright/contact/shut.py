@@ -22,7 +22,7 @@ class ShutOptions:
     rounds     of wishes
     """
 
-    overlap_mm: float = 0.1
+    overlap_mm: float = 0.05
     touch_mm: float = 0.05
     inside_mm: float = 2.0
     smooth_mm: float = 4.0
@@ -67,21 +67,15 @@ class LipSlit:
             move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, wish
         return move[:, None] * self.axes[1], over
 
-    def shut(self, poses, acts):
-        """(n, 3) correction that shuts the slit in poses weight -> (n, 3); acts: how strongly it acts at a weight."""
-        field = np.zeros_like(next(iter(poses.values())))
-        hold = np.zeros(len(field))
+    def shut(self, skin):
+        """(n, 3) correction that shuts the slit of a pose (n, 3)."""
+        field, hold = np.zeros_like(skin), np.zeros(len(skin))
         hold[np.concatenate(self.seams)] = 1.0
         for _ in range(self.options.rounds):
-            total, most = np.zeros_like(field), np.zeros(len(field))
-            for weight, pose in poses.items():
-                share = acts(weight)
-                wish, over = self.wishes(pose + share * field)
-                more = over / share > most
-                total[more], most[more] = wish[more] / share, over[more] / share
-            if not most.any():
+            wishes, over = self.wishes(skin + field)
+            if not over.any():
                 break
-            field = field + self._spread(total, _PIN * hold, self.options.smooth_mm)
+            field = field + self._spread(wishes, _PIN * hold, self.options.smooth_mm)
         return field
 
 

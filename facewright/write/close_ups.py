@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from facewright.conventions import MOUTH_PAIRS
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.shapes import shape_names, with_base
 from facewright.mesh.raster import Camera
@@ -16,7 +16,6 @@ from facewright.write.sheet import Cell, Section
 WEIGHTS = (0.5, 1.0)
 SIZE = (152, 292)  # (height, width) in pixels
 COLUMNS = 6
-EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
 _UPPER, _MIDDLE = ("eye", "brow"), ("cheekSquint", "noseSneer")  # what is looked at; the rest is the mouth's
 _AROUND_MM = 30.0  # beyond the picture's edge: what may come into it
 
