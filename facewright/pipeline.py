@@ -26,7 +26,7 @@ from facewright.register import RegisterOptions, register
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
-from facewright.transfer import keep_within_regions, ride_on_lids, transfer_shapes
+from facewright.transfer import keep_within_amplitudes, keep_within_regions, ride_on_lids, transfer_shapes
 from facewright.write.credits import write_credits
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
@@ -238,7 +238,7 @@ def _parts(run, scan, face, template):
 
 def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
-    carried = hold_neck(face, keep_within_regions(face, transfer_shapes(face)))
+    carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
     skin = solve_mouth(face, solve_eyes(face, lay_tongue(face, carried)), jobs=jobs)
     return _with_riders(face, skin)
 

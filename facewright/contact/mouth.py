@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
@@ -18,6 +19,7 @@ from facewright.conventions import (
     in_between_name,
     mirrored_name,
 )
+from facewright.mesh.folds import laid_flat, neighbour_mean
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
 
@@ -47,13 +49,17 @@ PAIRS = (
 @dataclass(frozen=True)
 class MouthOptions:
     """lips, close  how lips meet, how mouthClose is made
+    flat_mm      from the seam: skin that may give way where a shape folds it
     window_mm    width over the midline over which left hands over to right
+    tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
     halves       shapes that get an in-between at half
     pairs        shapes, or both sides of them, that get a corrective together
     """
 
     lips: LipOptions = field(default_factory=LipOptions)
     close: MouthCloseOptions = field(default_factory=MouthCloseOptions)
+    flat_mm: float = 12.0
+    tongue_share: float = 0.5
     window_mm: float = 44.0
     halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
     pairs: tuple[tuple[str, str], ...] = PAIRS
@@ -76,6 +82,7 @@ def solve_mouth(face, targets, options=None, jobs=1):
     result = mouth.with_arc(targets)
     result = mouth.with_single_shapes(result)
     result = mouth.with_both_sides(result)
+    result = mouth.with_flat_corners(result)
     result = mouth.with_halves(result)
     result = mouth.with_mouth_close(result)
     result = mouth.with_pairs(result)
@@ -138,6 +145,23 @@ class _Mouth:
                 targets = self._corrected(targets, {name: 1.0, twin: 1.0}, shares)
         return targets
 
+    def with_flat_corners(self, targets):
+        """Targets of which none folds the skin around the lips, as where both pull at the small faces of a corner."""
+        skin = self.face.vertices[self.skin]
+        mean = neighbour_mean(self.faces, len(skin), self.seams)
+        away = cKDTree(skin[np.concatenate(self.seams)]).query(skin)[0]
+        keep = away > self.options.flat_mm
+        deltas = np.array(targets.deltas)
+
+        def flat(name):
+            moved = skin + targets.delta(name)[self.skin]
+            return laid_flat(skin, moved, self.faces, keep, mean) - moved
+
+        names = self._lip_shapes(targets)
+        for name, change in zip(names, self._each(flat, names)):
+            deltas[targets.names.index(name), self.skin] += change
+        return replace(targets, deltas=deltas)
+
     def with_mouth_close(self, targets):
         """Targets whose mouthClose closes the lips of a jaw that opens by the same weight."""
         if not {"mouthClose", "jawOpen"} <= set(targets.names):
@@ -180,8 +204,10 @@ class _Mouth:
         return replace(targets, extras=extras, correctives=correctives)
 
     def with_tongue(self, targets):
-        """Targets with a corrective for a tongue that comes out of an open mouth: it parts the teeth by itself, and both
-        together would open the jaw farther than it goes."""
+        """Targets with a corrective for a tongue that comes out of an open mouth.
+
+        It parts the teeth by itself, and both together would open the jaw farther than it goes.
+        """
         parts = [part for part in self.face.template.parts if part.name == "teeth_lower"]
         if not parts or not {"jawOpen", "tongueOut"} <= set(targets.names):
             return targets
@@ -190,7 +216,10 @@ class _Mouth:
         share = np.vdot(out[teeth], opened[teeth]) / max(np.vdot(opened[teeth], opened[teeth]), 1e-12)
         drivers = ("jawOpen", "tongueOut")
         name = corrective_name(drivers)
-        extras, correctives = targets.extras | {name: -share * opened}, targets.correctives | {name: drivers}
+        extras, correctives = (
+            targets.extras | {name: -self.options.tongue_share * share * opened},
+            targets.correctives | {name: drivers},
+        )
         return replace(targets, extras=extras, correctives=correctives)
 
     def with_halves(self, targets):

@@ -17,7 +17,8 @@ _PIN = 100.0  # weight of a wish against 1 mm2 of bending
 class ShutOptions:
     """overlap_mm by which one lip covers the other as seen from the front
     touch_mm   a slit narrower than this is none
-    inside_mm  behind the seam: lip that still counts as seen
+    inside_mm, outside_mm  behind and before the seam: lip that counts
+    pitch_deg  a slit counts as seen from so far above and below the front
     smooth_mm  width over which a wish is felt; reach_mm over which it fades
     rounds     of wishes
     """
@@ -25,6 +26,8 @@ class ShutOptions:
     overlap_mm: float = 0.05
     touch_mm: float = 0.05
     inside_mm: float = 2.0
+    outside_mm: float = 9.0
+    pitch_deg: float = 6.0
     smooth_mm: float = 4.0
     reach_mm: float = 9.0
     rounds: int = 5
@@ -42,20 +45,32 @@ class LipSlit:
         self.options = options or ShutOptions()
         self.seams, self.axes = seams, axes
         seam = np.unique(np.concatenate(seams))
-        shown = outer | (cKDTree(vertices[seam]).query(vertices)[0] < self.options.inside_mm)
+        away = cKDTree(vertices[seam]).query(vertices)[0]
+        shown = away < np.where(outer, self.options.outside_mm, self.options.inside_mm)
+        pitch = np.radians(self.options.pitch_deg)
+        self._heights = [np.cos(pitch) * axes[1] + turn * np.sin(pitch) * axes[2] for turn in (-1.0, 1.0)]
         self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
         self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm)
         self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]
 
     def gaps(self, skin):
         """(k,) of each line of a pose (n, 3): height in mm of the slit at its inner vertices, less than 0: covered."""
-        x, y = skin @ self.axes[0], skin @ self.axes[1]
+        x = skin @ self.axes[0]
         result = []
         for line in self.seams:
-            at = x[line[1:-1]]
-            low = -_highest(at, x, -y, self._edges[0])  # the upper lip's lower edge
-            high = _highest(at, x, y, self._edges[1])
-            result.append(np.where(np.isfinite(low) & np.isfinite(high), low - high, -np.inf))
+            at, worst = x[line[1:-1]], np.full(len(line) - 2, -np.inf)
+            over = [_Crossings(at, x, edges) for edges in self._edges]
+            for height in self._heights:
+                y = skin @ height
+                low, high = (
+                    -over[0].highest(-y),
+                    over[1].highest(y),
+                )  # the upper lip's lower edge, the lower's upper one
+                gap = np.full(len(at), -np.inf)
+                both = np.isfinite(low) & np.isfinite(high)
+                gap[both] = low[both] - high[both]
+                worst = np.maximum(worst, gap)
+            result.append(worst)
         return result
 
     def wishes(self, skin):
@@ -79,10 +94,18 @@ class LipSlit:
         return field
 
 
-def _highest(at, x, y, edges):
-    """(k,) largest y over edges (e, 2) of points (x, y) (n,) above places at (k,) of x; -inf where there is no edge."""
-    a, b = edges[:, 0], edges[:, 1]
-    span = x[b] - x[a]
-    share = (at[:, None] - x[a]) / np.where(np.abs(span) > 1e-9, span, np.inf)
-    height = y[a] + share * (y[b] - y[a])
-    return np.where((share >= 0.0) & (share <= 1.0) & (np.abs(span) > 1e-9), height, -np.inf).max(axis=1, initial=-np.inf)
+class _Crossings:
+    """Where edges (e, 2) of points at x (n,) pass places at (k,) of x."""
+
+    def __init__(self, at, x, edges):
+        one, other = np.sort(x[edges], axis=1).T
+        self._place, self._edge = np.nonzero((at[:, None] >= one) & (at[:, None] <= other) & (other - one > 1e-9))
+        self._a, self._b = edges[self._edge].T
+        self._share = (at[self._place] - x[self._a]) / (x[self._b] - x[self._a])
+        self._count = len(at)
+
+    def highest(self, y):
+        """(k,) largest y (n,) of the edges at each place; -inf where there is none."""
+        result = np.full(self._count, -np.inf)
+        np.maximum.at(result, self._place, y[self._a] + self._share * (y[self._b] - y[self._a]))
+        return result

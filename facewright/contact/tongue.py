@@ -39,7 +39,9 @@ def lay_tongue(face, deltas, options=None):
     skull = face.regions["skull"]
     still = skull if skull.any() else face.regions["outer"]
     up = best_rotation(template.vertices[still], face.vertices[still])[:, 1]
-    upper, lower = (_middle(face.vertices + deltas[number], face.lines[f"lip_seam_{lip}"]) for lip in ("upper", "lower"))
+    upper, lower = (
+        _middle(face.vertices + deltas[number], face.lines[f"lip_seam_{lip}"]) for lip in ("upper", "lower")
+    )
     level = ((1 - options.share) * lower + options.share * upper) @ up
     weights = _sinks(template.vertices[at], template.faces[part.face_slice] - part.vertices[0], options)
     above = (face.vertices + deltas[number])[at] @ up - level

@@ -24,7 +24,12 @@ def rig_rows(rig, blends=BLENDS, own_crossings=None):
     """
     whole = bool(rig.regions and rig.lines)
     rows = [*eye_rows(rig), *(mouth_rows(rig) if whole else ()), *(jaw_rows(rig) if whole else ())]
-    rows += [*(teeth_rows(rig) if whole else ()), *lash_rows(rig), *shape_rows(rig, own_crossings), *expression_rows(rig)]
+    rows += [
+        *(teeth_rows(rig) if whole else ()),
+        *lash_rows(rig),
+        *shape_rows(rig, own_crossings),
+        *expression_rows(rig),
+    ]
     return rows + blend_rows(rig, blends, lip_crossing(rig) if whole else None) if blends else rows
 
 

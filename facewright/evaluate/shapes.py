@@ -165,7 +165,7 @@ def mirror_mm(rig, mirror):
 
 
 def pair_crossings(rig):
-    """"a + b" -> new crossing pairs of faces in each of the pairs that lids and lips must survive."""
+    """ "a + b" -> new crossing pairs of faces in each of the pairs that lids and lips must survive."""
     check, play = SkinCheck(rig), Player(rig, full=True)
     poses = {" + ".join(pair): both_sides(dict.fromkeys(pair, 1.0), play.names) for pair in (*EYE_PAIRS, *MOUTH_PAIRS)}
     return {name: check.crossing(play(check.skin, weights)) for name, weights in poses.items() if weights is not None}

@@ -154,7 +154,9 @@ def rig_drawables(rig, textured, targets=()):
     """A Drawable per mesh of the rig under targets at weight 1. Clay keeps the colours of eyes, teeth and tongue."""
 
     def moved(mesh):
-        return mesh.vertices + sum(mesh.deltas[t] for t in targets) if targets and mesh.deltas is not None else mesh.vertices
+        if not targets or mesh.deltas is None:
+            return mesh.vertices
+        return mesh.vertices + sum(mesh.deltas[target] for target in targets)
 
     skin, drawables = moved(rig.meshes[0]), []
     for mesh in rig.meshes:

@@ -52,8 +52,7 @@ class Studio:
             field = field + left + left[canvas.mirror] * FLIP
         if "lip_lines_mm" in sketch:
             left = self.lip_lines(canvas.V + field, canvas.F, sketch["lip_lines_mm"])
-            right = left[canvas.mirror] * FLIP
-            field = field + np.where(canvas.mirror[:, None] == np.arange(canvas.n)[:, None], left, left + right)
+            field = field + left + left[canvas.mirror] * FLIP
         return field if other else symmetric_field(field, canvas.mirror)
 
     def _lips(self, sketch):

@@ -26,7 +26,8 @@ class LipLines:
         wave = np.cos(2 * np.pi * from_middle / PERIOD)
         across = np.minimum((row - ROWS[0]) / (ROWS[1] - ROWS[0]), (ROWS[3] - row) / (ROWS[3] - ROWS[2]))
         along = (CORNER[1] - from_middle / CORNER_COLUMN) / (CORNER[1] - CORNER[0])
-        self.height = wave * np.clip(across, 0.0, 1.0) * np.clip(along, 0.0, 1.0)
+        half = np.where(from_middle == 0, 0.5, 1.0)  # the middle is in the mirror image too
+        self.height = half * wave * np.clip(across, 0.0, 1.0) * np.clip(along, 0.0, 1.0)
 
     def __call__(self, V, F, depth_mm):
         """(n, 3) displacement of the left half of a pose V (n, 3): from crest to groove depth_mm along the normals."""
