@@ -57,10 +57,9 @@ class LipContact:
     seams    upper and lower line, paired, with shared ends
     outer    (n,) bool: skin that is seen
     teeth    sequence of slices of the rows of teeth among the vertices, with their faces (from 0): (slice, faces)
-    axes     (3, 3) rows: where left, up and forward are for this head
     """
 
-    def __init__(self, vertices, faces, seams, outer, teeth=(), axes=None, options=None):
+    def __init__(self, vertices, faces, seams, outer, teeth=(), options=None):
         self.options = options or LipOptions()
         self.V = vertices
         seam = np.unique(np.concatenate(seams))
@@ -82,8 +81,7 @@ class LipContact:
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
         self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm)
-        axes = np.eye(3) if axes is None else axes
-        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used], axes)
+        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used])
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)

@@ -52,6 +52,7 @@ class MouthOptions:
     flat_mm      from the seam: skin that may give way where a shape folds it
     window_mm    width over the midline over which left hands over to right
     tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
+    once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
     halves       shapes that get an in-between at half
     pairs        shapes, or both sides of them, that get a corrective together
     """
@@ -60,6 +61,8 @@ class MouthOptions:
     close: MouthCloseOptions = field(default_factory=MouthCloseOptions)
     flat_mm: float = 12.0
     tongue_share: float = 0.5
+    once: tuple[str, ...] = ("mouthFunnel", "mouthPucker")
+    once_share: float = 0.6
     window_mm: float = 44.0
     halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
     pairs: tuple[tuple[str, str], ...] = PAIRS
@@ -80,9 +83,9 @@ def solve_mouth(face, targets, options=None, jobs=1):
     """
     mouth = _Mouth(face, options or MouthOptions(), jobs)
     result = mouth.with_arc(targets)
+    result = mouth.with_flat_corners(result)
     result = mouth.with_single_shapes(result)
     result = mouth.with_both_sides(result)
-    result = mouth.with_flat_corners(result)
     result = mouth.with_halves(result)
     result = mouth.with_mouth_close(result)
     result = mouth.with_pairs(result)
@@ -109,10 +112,8 @@ class _Mouth:
         teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]
         skull = face.regions["skull"]
         still = skull if skull.any() else face.regions["outer"]
-        axes = best_rotation(template.vertices[still], face.vertices[still]).T
-        self.forward = axes[2]
-        outer = face.regions["outer"]
-        self.contact = LipContact(face.vertices, self.faces, self.seams, outer, teeth, axes, options.lips)
+        self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
+        self.contact = LipContact(face.vertices, self.faces, self.seams, face.regions["outer"], teeth, options.lips)
         share = np.clip(0.5 + template.vertices[:, 0] / options.window_mm, 0.0, 1.0)
         self.left = (share * share * (3 - 2 * share))[:, None]
 
@@ -256,19 +257,23 @@ class _Mouth:
 
     def _lack(self, targets, pose, weights=None, acts=None, closed=False):
         """(n, 3) what a pose lacks along its way; weights, acts, closed as LipContact.apart takes them."""
+        act = acts or (lambda weight: weight)
+        first = self._too_much(targets, pose)
 
         def motion(weight):
-            return targets.motion(_scaled(pose, weight))
+            return targets.motion(_scaled(pose, weight)) + act(weight) * first
 
-        if not _stays_shut(pose):
-            return self.contact.apart(motion, weights, acts, closed)
-        act = acts or (lambda weight: weight)
-        shut = self.contact.shut(motion, weights, acts)
+        shut = _stays_shut(pose)
+        if shut:
+            first = first + self.contact.shut(motion, weights, acts)
+        return first + self.contact.apart(motion, weights, acts, closed, shut)
 
-        def shut_motion(weight):
-            return motion(weight) + act(weight) * shut
-
-        return shut + self.contact.apart(shut_motion, weights, acts, closed, shut=True)
+    def _too_much(self, targets, pose):
+        """(n, 3) what a pose does twice: the ring of muscle around the mouth draws together only once."""
+        names = [name for name in self.options.once if name in pose]
+        if len(names) < 2:
+            return np.zeros_like(self.face.vertices)
+        return -self.options.once_share * targets.motion({names[-1]: pose[names[-1]]})
 
     def _corrected(self, targets, pose, shares, **how):
         """Targets after the contact of a pose has been solved along its way; shares: name -> its part of the result."""

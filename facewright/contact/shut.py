@@ -23,39 +23,38 @@ class ShutOptions:
     rounds     of wishes
     """
 
-    overlap_mm: float = 0.05
-    touch_mm: float = 0.05
+    overlap_mm: float = 0.0
+    touch_mm: float = 0.15
     inside_mm: float = 2.0
     outside_mm: float = 9.0
-    pitch_deg: float = 6.0
+    pitch_deg: float = 2.0
     smooth_mm: float = 4.0
     reach_mm: float = 9.0
     rounds: int = 5
 
 
 class LipSlit:
-    """The slit between the lips of one head, looked at from the front.
+    """The slit between the lips of one head, looked at from the front of our frame (+Z out of the face, +Y up).
 
     vertices (n, 3) of the surroundings of the lips at rest, faces (m, 3); patches: faces of the upper and the lower lip
     seams    the two lines, paired; outer (n,) bool; free (n,) bool: skin that may follow
-    axes     (3, 3) rows: where left, up and forward are for this head
     """
 
-    def __init__(self, vertices, faces, patches, seams, outer, free, axes, options=None):
+    def __init__(self, vertices, faces, patches, seams, outer, free, options=None):
         self.options = options or ShutOptions()
-        self.seams, self.axes = seams, axes
+        self.seams = seams
         seam = np.unique(np.concatenate(seams))
         away = cKDTree(vertices[seam]).query(vertices)[0]
         shown = away < np.where(outer, self.options.outside_mm, self.options.inside_mm)
         pitch = np.radians(self.options.pitch_deg)
-        self._heights = [np.cos(pitch) * axes[1] + turn * np.sin(pitch) * axes[2] for turn in (-1.0, 1.0)]
+        self._heights = [np.array([0.0, np.cos(pitch), turn * np.sin(pitch)]) for turn in (-1.0, 1.0)]
         self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
         self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm)
         self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]
 
     def gaps(self, skin):
         """(k,) of each line of a pose (n, 3): height in mm of the slit at its inner vertices, less than 0: covered."""
-        x = skin @ self.axes[0]
+        x = skin[:, 0]
         result = []
         for line in self.seams:
             at, worst = x[line[1:-1]], np.full(len(line) - 2, -np.inf)
@@ -80,7 +79,7 @@ class LipSlit:
             more = gap - rest
             wish = np.where(more > self.options.touch_mm, more + self.options.overlap_mm, 0.0)
             move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, wish
-        return move[:, None] * self.axes[1], over
+        return move[:, None] * [0.0, 1.0, 0.0], over
 
     def shut(self, skin):
         """(n, 3) correction that shuts the slit of a pose (n, 3)."""

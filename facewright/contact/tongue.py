@@ -8,7 +8,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import border_vertices
-from facewright.solve.procrustes import best_rotation
 
 
 @dataclass(frozen=True)
@@ -36,18 +35,15 @@ def lay_tongue(face, deltas, options=None):
     if part is None or "jawOpen" not in template.shape_names:
         return deltas
     number, at = template.shape_names.index("jawOpen"), part.vertex_slice
-    skull = face.regions["skull"]
-    still = skull if skull.any() else face.regions["outer"]
-    up = best_rotation(template.vertices[still], face.vertices[still])[:, 1]
     upper, lower = (
         _middle(face.vertices + deltas[number], face.lines[f"lip_seam_{lip}"]) for lip in ("upper", "lower")
     )
-    level = ((1 - options.share) * lower + options.share * upper) @ up
+    level = ((1 - options.share) * lower + options.share * upper)[1]
     weights = _sinks(template.vertices[at], template.faces[part.face_slice] - part.vertices[0], options)
-    above = (face.vertices + deltas[number])[at] @ up - level
+    above = (face.vertices + deltas[number])[at, 1] - level
     depth = (above[weights > 0.5] / weights[weights > 0.5]).max(initial=0.0)
     result = np.array(deltas)
-    result[number, at] -= np.clip(depth, 0.0, options.most_mm) * weights[:, None] * up
+    result[number, at, 1] -= np.clip(depth, 0.0, options.most_mm) * weights
     return result
 
 
