@@ -23,11 +23,11 @@ from facewright.contact import part_lips
 from facewright.data import Face
 from facewright.evaluate.bars import rig_rows
 from facewright.evaluate.rows import Row, worst_rows
-from facewright.evaluate.shapes import MIRROR_BAR_MM, mirror_mm
+from facewright.evaluate.shapes import MIRROR_BAR_MM, crossings, mirror_mm
 from facewright.evaluate.synthetic import random_identity
 from facewright.packing import pack_face, unpack_face
 from facewright.parts import fit_parts
-from facewright.pipeline import rig_from_face
+from facewright.pipeline import rig_from_face, template_rig
 from facewright.read import read_scan
 from facewright.register import register
 from facewright.sample import sample_path
@@ -85,8 +85,8 @@ def heads(template, count, only, fresh):
             yield name, registered(template, scans[name], fresh)
 
 
-def measure(template, name, face, blends):
-    """Rows of one head, its time rows included."""
+def measure(template, name, face, blends, own):
+    """Rows of one head, its time rows included; own: crossings of the template's own head."""
     seconds = {}
     rig = rigged(face, seconds)
     rows = [
@@ -99,7 +99,7 @@ def measure(template, name, face, blends):
             Row("shapes", shape, "differs from its mirror image mm", value, bar=(None, MIRROR_BAR_MM))
             for shape, value in found.items()
         ]
-    return rows + rig_rows(rig, blends)
+    return rows + rig_rows(rig, blends, own)
 
 
 def print_summary(title, tables):
@@ -141,10 +141,10 @@ def main():
         if template is None:
             print(f"template {template_name} is not here: left out")
             continue
-        tables = {}
+        tables, own = {}, crossings(template_rig(template))
         for name, face in heads(template, options.heads, options.only, options.fresh):
             blends = -(-options.blends // options.heads) if name.startswith("random") else options.blends
-            tables[name] = measure(template, name, face, blends)
+            tables[name] = measure(template, name, face, blends, own)
             judged = [row for row in tables[name] if row.has_bar]
             print(f"{template_name} {name}: {sum(row.met for row in judged)} of {len(judged)} bars met", flush=True)
             if options.all:

@@ -10,15 +10,11 @@ import argparse
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 from render import jpeg_bytes
 
-from facewright.contact import part_lips
-from facewright.data import Face
 from facewright.errors import InputError
 from facewright.mesh.raster import Camera
-from facewright.parts import fit_parts
-from facewright.pipeline import rig_from_face
+from facewright.pipeline import template_rig
 from facewright.template.store import read_template
 from facewright.write.close_ups import close_up_cameras, close_up_poses
 from facewright.write.files import replace_file
@@ -30,16 +26,12 @@ IN_A_ROW = 2  # shapes, each with a picture per template
 FACE, FACE_COLUMNS = (232, 196), 7
 
 
-def template_rig(name):
+def own_rig(name):
     """The Rig of a template's own head, or None where the template is not here."""
     try:
-        template = read_template(name)
+        return template_rig(read_template(name))
     except InputError:
         return None
-    seen, closed = np.ones(len(template.vertices), bool), {"left": False, "right": False}
-    V = template.vertices
-    face = Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})
-    return rig_from_face(part_lips(fit_parts(face)))
 
 
 def beside_each_other(rigs, where):
@@ -79,7 +71,7 @@ def main():
     parser.add_argument("--templates", nargs="*", default=["hm08", "ict"])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "images")
     options = parser.parse_args()
-    found = {name: template_rig(name) for name in options.templates}
+    found = {name: own_rig(name) for name in options.templates}
     rigs = {name: rig for name, rig in found.items() if rig is not None}
     for name in set(found) - set(rigs):
         print(f"template {name} is not here: left out")

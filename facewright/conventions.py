@@ -16,6 +16,7 @@ ARKIT_SHAPES = tuple(
     cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft noseSneerRight tongueOut""".split()
 )
 
+EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
 MOUTH_PAIRS = (
     ("mouthSmile", "jawOpen"),
     ("mouthSmile", "mouthFunnel"),
@@ -24,7 +25,16 @@ MOUTH_PAIRS = (
     ("mouthRollUpper", "mouthRollLower"),
     ("mouthShrugUpper", "mouthShrugLower"),
 )
-"""Pairs of shapes that lips must survive together; a name without its side stands for both sides."""
+"""Pairs of shapes that lids and lips must survive together; a name without its side stands for both sides."""
+
+SHUT_SHAPES = tuple(
+    """jawForward jawLeft jawRight mouthPucker mouthLeft mouthRight mouthSmile mouthFrown mouthDimple mouthStretch
+    mouthRollLower mouthRollUpper mouthShrugLower mouthPress cheekPuff""".split()
+)
+"""Shapes, without their sides, under which lips that are shut stay shut, alone and two together."""
+
+SHUT_PAIRS = (("mouthShrugUpper", "mouthShrugLower"),)
+"""Pairs under which they do so too, though one of the two opens them."""
 
 INTERPUPILLARY_MM = 63.0
 """Mean adult distance between the pupils: the scale of a scan that states none, and of every benchmark figure."""

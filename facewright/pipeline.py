@@ -14,8 +14,9 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
-from facewright.contact import Targets, find_jaw, hold_neck, lay_flat, part_lips, solve_eyes, solve_mouth
+from facewright.contact import Targets, find_jaw, hold_neck, lay_flat, lay_tongue, part_lips, solve_eyes, solve_mouth
 from facewright.conventions import ARKIT_SHAPES
+from facewright.data import Face
 from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
 from facewright.output import OutputFolder
@@ -29,7 +30,7 @@ from facewright.register import RegisterOptions, register
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
-from facewright.transfer import keep_within_regions, ride_on_lids, transfer_shapes
+from facewright.transfer import keep_within_amplitudes, keep_within_regions, ride_on_lids, transfer_shapes
 from facewright.write.credits import write_credits
 from facewright.write.files import PngOnce
 from facewright.write.gltf import write_gltf
@@ -261,13 +262,22 @@ def _parts(run, scan, face, template):
 
 def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
-    skin = solve_eyes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
-    return _with_riders(face, lay_flat(face, solve_mouth(face, skin, jobs=jobs)))
+    carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
+    skin = solve_mouth(face, solve_eyes(face, lay_tongue(face, carried)), jobs=jobs)
+    return _with_riders(face, lay_flat(face, skin))
 
 
 def rig_from_face(face, maps=None, jobs=1):
     """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
     return _assembled(face, shapes_of(face, jobs), maps)
+
+
+def template_rig(template, jobs=1):
+    """The data.Rig of a Template's own head, made as a person's is."""
+    seen, closed = np.ones(len(template.vertices), bool), {"left": False, "right": False}
+    V = template.vertices
+    face = Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})
+    return rig_from_face(part_lips(fit_parts(face)), jobs=jobs)
 
 
 def _transfer(run, face, template, jobs, beside):

@@ -191,10 +191,12 @@ def _compose_albedo(template, skin, texels, colors, colored, fill, jobs):
 
     def work(piece):
         face, barycentric = texels.face[piece], texels.barycentric[piece]
-        weight = at_points(fill.weight, skin.F, face, barycentric)[:, None]
+        # Faces behind a rim may lie in another chart: what was spread there from seen texels is of other skin.
+        here = skin.outer_faces[face]
+        weight = (at_points(fill.weight, skin.F, face, barycentric) * here)[:, None]
         own = seen[texels.index[piece]]
         filled = at_points(fill.color, skin.F, face, barycentric)
-        detail = at_points(fill.detail, skin.F, face, barycentric)
+        detail = at_points(fill.detail, skin.F, face, barycentric) * here
         at = np.flatnonzero((detail > 0) & (weight[:, 0] < 1) & mirrored_face[face])
         uv = at_corners(corner_uv, face[at], barycentric[at])
         other = sample_pixels(seen.reshape(size, size, 3), uv.astype(np.float64) * size)
@@ -214,6 +216,7 @@ def _compose_normal(skin, texels, bends, met, weight, jobs):
 
     def work(piece):
         share = at_points(weight, skin.F, texels.face[piece], texels.barycentric[piece])
+        share = share * skin.outer_faces[texels.face[piece]]
         result[piece] = seen[texels.index[piece]] * share[:, None]
 
     in_chunks(work, len(texels), jobs)

@@ -88,13 +88,27 @@ def print_bars(path, blends, as_json):
     from facewright.write.rig import read_rig
 
     rig = read_gltf_rig(path) if path.is_file() else read_rig(path / "rig")
-    rows = rig_rows(rig, blends)
+    rows = rig_rows(rig, blends, own_crossings(rig.info))
     if as_json:
         print(json.dumps([asdict(row) | {"met": row.met} for row in rows], indent=1))
         return
     if not rig.regions:
         print("no regions or feature lines in this file: folds and tears count the inside of the mouth too")
     print_rows(rows)
+
+
+def own_crossings(info):
+    """Crossings that the template of a rig has on its own head; None where that template is not here."""
+    from facewright.evaluate.shapes import crossings
+    from facewright.pipeline import template_rig
+    from facewright.template.store import read_template
+
+    try:
+        template = read_template(info["template"])
+    except (InputError, KeyError):
+        return None
+    same = template.info.get("topology_id") == info.get("topology_id")
+    return crossings(template_rig(template)) if same else None
 
 
 def print_rows(rows):

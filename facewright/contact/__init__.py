@@ -6,14 +6,17 @@ from facewright.contact.jaw import find_jaw
 from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
 from facewright.contact.neck import hold_neck
 from facewright.contact.targets import Targets
+from facewright.contact.tongue import TongueOptions, lay_tongue
 
 __all__ = [
     "EyeShapeOptions",
     "MouthOptions",
     "Targets",
+    "TongueOptions",
     "find_jaw",
     "hold_neck",
     "lay_flat",
+    "lay_tongue",
     "part_lips",
     "solve_eyes",
     "solve_mouth",

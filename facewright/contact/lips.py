@@ -14,6 +14,7 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.contact.shut import LipSlit
 from facewright.contact.teeth import Teeth
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
@@ -41,7 +42,7 @@ class LipOptions:
 
     lip_mm: float = 12.0
     near_mm: float = 20.0
-    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.8, 0.8, 0.8, 0.8)
+    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 9
     reach_mm: float = 4.0
     touch_mm: float = 0.15
     gap_mm: float = 0.05
@@ -72,13 +73,15 @@ class LipContact:
         self.rims = [border_vertices(patch, len(self.used)) for patch in self.patches]
         place = np.full(len(vertices), -1)
         place[self.used] = np.arange(len(self.used))
-        self._pairs = [place[line[1:-1]] for line in seams]
+        lines = [place[line] for line in seams]
+        self._pairs = [line[1:-1] for line in lines]
         self._both = np.concatenate(self.sides)
         self.lips = self.used[self._both]
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
         self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm)
+        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used])
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
@@ -86,16 +89,31 @@ class LipContact:
         in_teeth = [np.linalg.norm(row.way_out(rest[self._guarded], vertices[at]), axis=1) for at, row in self.teeth]
         self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
 
-    def apart(self, motion, weights=None, acts=None, closed=False):
+    def shut(self, motion, weights=None, acts=None):
+        """(n, 3) correction of a motion so that no slit is open between the lips where the correction acts most.
+
+        Arguments as of apart. Less than whole a slit opens as the motion does, but a pair's corrective acts as the
+        square of that: what shut it half way would be twice too much at the end.
+        """
+        weight = self._where_it_acts_most(weights, acts)
+        skin = (self.V + motion(weight))[self.used]
+        return self._of_head(self.slit.shut(skin) / (acts(weight) if acts else weight))
+
+    def _where_it_acts_most(self, weights, acts):
+        return max(weights or self.options.weights, key=acts or (lambda weight: weight))
+
+    def apart(self, motion, weights=None, acts=None, closed=False, shut=False):
         """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
 
         motion   function of a weight: displacement (n, 3) of the head from the neutral
         acts     function of a weight: how strongly the correction acts there; default: as the weight
         weights  at which contact is solved; default: options.weights
         closed   the lips shall meet: pairs of the seam stay together while the rest moves apart, locally
+        shut     no slit shall open between them where they give way
         """
         field = np.zeros((len(self.used), 3))
         hold = np.zeros(len(self.used))
+        most_weight = self._where_it_acts_most(weights, acts)
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
         asked = list(poses)
         for width in _LOCAL_MM if closed else self.options.smooth_mm:
@@ -106,6 +124,8 @@ class LipContact:
                 wishes, heeded = self._wishes(skin, poses[weight])
                 if closed:
                     self._add_closing(skin, wishes, heeded)
+                if shut and weight == most_weight:
+                    self._add_shutting(skin, wishes, heeded)
                 size = np.linalg.norm(wishes, axis=1) / share
                 more = size > most
                 total[more], most[more] = wishes[more] / share, size[more]
@@ -118,6 +138,10 @@ class LipContact:
                 break
             # What was free stays unasked until the rest is free: most of a path never touches.
             asked = met or list(poses)
+        return self._of_head(field)
+
+    def _of_head(self, field):
+        """(n, 3) a field of the surroundings of the lips (k, 3) as one of the whole head."""
         result = np.zeros_like(self.V)
         result[self.used] = field
         result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
@@ -145,6 +169,12 @@ class LipContact:
         push = 0.5 * way[far] * (1 - self.options.gap_mm / apart[far])[:, None]
         wishes[a[far]], wishes[b[far]] = push, -push
         counts[a[far]] = counts[b[far]] = 1.0
+
+    def _add_shutting(self, skin, wishes, counts):
+        """Add, in place, what shuts the slit where no lip has met anything else."""
+        lift, over = self.slit.wishes(skin)
+        more = (over > 0.0) & (counts == 0.0)
+        wishes[more], counts[more] = lift[more], 1.0
 
     def _lip_wishes(self, skin):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""

@@ -6,11 +6,20 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
-from facewright.conventions import MOUTH_PAIRS, corrective_name, in_between_name, mirrored_name
+from facewright.conventions import (
+    MOUTH_PAIRS,
+    SHUT_PAIRS,
+    SHUT_SHAPES,
+    corrective_name,
+    in_between_name,
+    mirrored_name,
+)
+from facewright.mesh.folds import laid_flat, neighbour_mean
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
 
@@ -40,13 +49,20 @@ PAIRS = (
 @dataclass(frozen=True)
 class MouthOptions:
     """lips, close  how lips meet, how mouthClose is made
+    flat_mm      from the seam: skin that may give way where a shape folds it
     window_mm    width over the midline over which left hands over to right
+    tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
+    once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
     halves       shapes that get an in-between at half
     pairs        shapes, or both sides of them, that get a corrective together
     """
 
     lips: LipOptions = field(default_factory=LipOptions)
     close: MouthCloseOptions = field(default_factory=MouthCloseOptions)
+    flat_mm: float = 12.0
+    tongue_share: float = 0.5
+    once: tuple[str, ...] = ("mouthFunnel", "mouthPucker")
+    once_share: float = 0.6
     window_mm: float = 44.0
     halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
     pairs: tuple[tuple[str, str], ...] = PAIRS
@@ -67,11 +83,13 @@ def solve_mouth(face, targets, options=None, jobs=1):
     """
     mouth = _Mouth(face, options or MouthOptions(), jobs)
     result = mouth.with_arc(targets)
+    result = mouth.with_flat_corners(result)
     result = mouth.with_single_shapes(result)
     result = mouth.with_both_sides(result)
     result = mouth.with_halves(result)
     result = mouth.with_mouth_close(result)
     result = mouth.with_pairs(result)
+    result = mouth.with_tongue(result)
     return result.evened(face.template.mirror) if _is_even(face) else result
 
 
@@ -92,10 +110,10 @@ class _Mouth:
         self.seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
         rows = [part for part in template.parts if part.name.startswith("teeth")]
         teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]
-        self.contact = LipContact(face.vertices, self.faces, self.seams, face.regions["outer"], teeth, options.lips)
         skull = face.regions["skull"]
         still = skull if skull.any() else face.regions["outer"]
         self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
+        self.contact = LipContact(face.vertices, self.faces, self.seams, face.regions["outer"], teeth, options.lips)
         share = np.clip(0.5 + template.vertices[:, 0] / options.window_mm, 0.0, 1.0)
         self.left = (share * share * (3 - 2 * share))[:, None]
 
@@ -127,6 +145,23 @@ class _Mouth:
                 shares = {name: self.left, twin: 1.0 - self.left}
                 targets = self._corrected(targets, {name: 1.0, twin: 1.0}, shares)
         return targets
+
+    def with_flat_corners(self, targets):
+        """Targets of which none folds the skin around the lips, as where both pull at the small faces of a corner."""
+        skin = self.face.vertices[self.skin]
+        mean = neighbour_mean(self.faces, len(skin), self.seams)
+        away = cKDTree(skin[np.concatenate(self.seams)]).query(skin)[0]
+        keep = away > self.options.flat_mm
+        deltas = np.array(targets.deltas)
+
+        def flat(name):
+            moved = skin + targets.delta(name)[self.skin]
+            return laid_flat(skin, moved, self.faces, keep, mean) - moved
+
+        names = self._lip_shapes(targets)
+        for name, change in zip(names, self._each(flat, names)):
+            deltas[targets.names.index(name), self.skin] += change
+        return replace(targets, deltas=deltas)
 
     def with_mouth_close(self, targets):
         """Targets whose mouthClose closes the lips of a jaw that opens by the same weight."""
@@ -169,6 +204,25 @@ class _Mouth:
                 extras[name], correctives[name] = share * lack, drivers
         return replace(targets, extras=extras, correctives=correctives)
 
+    def with_tongue(self, targets):
+        """Targets with a corrective for a tongue that comes out of an open mouth.
+
+        It parts the teeth by itself, and both together would open the jaw farther than it goes.
+        """
+        parts = [part for part in self.face.template.parts if part.name == "teeth_lower"]
+        if not parts or not {"jawOpen", "tongueOut"} <= set(targets.names):
+            return targets
+        teeth = parts[0].vertex_slice
+        opened, out = targets.delta("jawOpen"), targets.delta("tongueOut")
+        share = np.vdot(out[teeth], opened[teeth]) / max(np.vdot(opened[teeth], opened[teeth]), 1e-12)
+        drivers = ("jawOpen", "tongueOut")
+        name = corrective_name(drivers)
+        extras, correctives = (
+            targets.extras | {name: -self.options.tongue_share * share * opened},
+            targets.correctives | {name: drivers},
+        )
+        return replace(targets, extras=extras, correctives=correctives)
+
     def with_halves(self, targets):
         """Targets with an in-between for shapes whose way no straight line follows: it passes round the teeth."""
         names = [name for name in self.options.halves if name in targets.names]
@@ -201,9 +255,25 @@ class _Mouth:
         motion = np.abs(targets.deltas[:, self.contact.lips]).max(axis=(1, 2))
         return [name for name, most in zip(targets.names, motion) if most > _MOVES_MM and name != "mouthClose"]
 
-    def _lack(self, targets, pose, **how):
-        """(n, 3) what a pose lacks along its way; how: as LipContact.apart takes it."""
-        return self.contact.apart(lambda weight: targets.motion(_scaled(pose, weight)), **how)
+    def _lack(self, targets, pose, weights=None, acts=None, closed=False):
+        """(n, 3) what a pose lacks along its way; weights, acts, closed as LipContact.apart takes them."""
+        act = acts or (lambda weight: weight)
+        first = self._too_much(targets, pose)
+
+        def motion(weight):
+            return targets.motion(_scaled(pose, weight)) + act(weight) * first
+
+        shut = _stays_shut(pose)
+        if shut:
+            first = first + self.contact.shut(motion, weights, acts)
+        return first + self.contact.apart(motion, weights, acts, closed, shut)
+
+    def _too_much(self, targets, pose):
+        """(n, 3) what a pose does twice: the ring of muscle around the mouth draws together only once."""
+        names = [name for name in self.options.once if name in pose]
+        if len(names) < 2:
+            return np.zeros_like(self.face.vertices)
+        return -self.options.once_share * targets.motion({names[-1]: pose[names[-1]]})
 
     def _corrected(self, targets, pose, shares, **how):
         """Targets after the contact of a pose has been solved along its way; shares: name -> its part of the result."""
@@ -237,6 +307,12 @@ def _hat(weight):
 
 def _scaled(weights, by):
     return {name: weight * by for name, weight in weights.items()}
+
+
+def _stays_shut(pose):
+    """Whether lips that are shut stay so under a pose: dict shape -> weight."""
+    names = {name if name in SHUT_SHAPES else name.removesuffix("Left").removesuffix("Right") for name in pose}
+    return names <= set(SHUT_SHAPES) or names in map(set, SHUT_PAIRS)
 
 
 def _sides(name, names):

@@ -15,15 +15,21 @@ from facewright.evaluate.teeth import teeth_rows
 BLENDS = 1000
 
 
-def rig_rows(rig, blends=BLENDS):
+def rig_rows(rig, blends=BLENDS, own_crossings=None):
     """list of rows.Row of a data.Rig: eyes, mouth, jaw, teeth, lashes, shapes, expressions, `blends` blends, a fifth as
     many mixes.
 
+    own_crossings  shapes.crossings of the template's own head, or None
     What a rig does not say (a GLB has no regions and no feature lines) is left out.
     """
     whole = bool(rig.regions and rig.lines)
     rows = [*eye_rows(rig), *(mouth_rows(rig) if whole else ()), *(jaw_rows(rig) if whole else ())]
-    rows += [*(teeth_rows(rig) if whole else ()), *lash_rows(rig), *shape_rows(rig), *expression_rows(rig)]
+    rows += [
+        *(teeth_rows(rig) if whole else ()),
+        *lash_rows(rig),
+        *shape_rows(rig, own_crossings),
+        *expression_rows(rig),
+    ]
     return rows + blend_rows(rig, blends, lip_crossing(rig) if whole else None) if blends else rows
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.conventions import INTERPUPILLARY_MM, mirrored_name
+from facewright.conventions import EYE_PAIRS, INTERPUPILLARY_MM, MOUTH_PAIRS, mirrored_name
 from facewright.evaluate.eyes import margin_gap_mm
-from facewright.evaluate.play import Player
+from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.quality import torn_edges
 from facewright.evaluate.rows import Row
 from facewright.mesh.adjacency import unique_edges
@@ -171,14 +171,37 @@ def mirror_mm(rig, mirror):
     return result
 
 
-def shape_rows(rig):
-    """Rows of every shape: folded, torn, crossings (no bar), stray motion, amplitude."""
-    rows = []
+def pair_crossings(rig):
+    """ "a + b" -> new crossing pairs of faces in each of the pairs that lids and lips must survive."""
+    check, play = SkinCheck(rig), Player(rig, full=True)
+    poses = {" + ".join(pair): both_sides(dict.fromkeys(pair, 1.0), play.names) for pair in (*EYE_PAIRS, *MOUTH_PAIRS)}
+    return {name: check.crossing(play(check.skin, weights)) for name, weights in poses.items() if weights is not None}
+
+
+def crossings(rig):
+    """Pose -> number of crossing pairs of faces, one in the face, that the neutral has not: shapes and pairs."""
+    singles = {_pose(name, rig): figures["self_intersections"] for name, figures in measure_shapes(rig).items()}
+    return singles | pair_crossings(rig)
+
+
+def _pose(name, rig):
+    return " + ".join(with_base(name, rig.target_names))
+
+
+def shape_rows(rig, own=None):
+    """Rows of every shape: folded, torn, crossings of shapes and pairs, stray motion, amplitude.
+
+    own  crossings of the template's own head: what a rig may have too; None: no bar
+    """
+    rows, crossing = [], {}
     for name, figures in measure_shapes(rig).items():
-        pose = " + ".join(with_base(name, rig.target_names))
+        pose = _pose(name, rig)
         rows.append(Row("shapes", pose, "folded faces", figures["folded"], bar=(None, 0)))
         rows.append(Row("shapes", pose, "torn edges", figures["torn"], bar=(None, 0)))
-        rows.append(Row("shapes", pose, "new self-intersections", figures["self_intersections"]))
+        crossing[pose] = figures["self_intersections"]
+    for pose, value in (crossing | pair_crossings(rig)).items():
+        bar = (None, None) if own is None else (None, own.get(pose, 0))
+        rows.append(Row("shapes", pose, "new self-intersections", value, bar=bar))
     if {"outer", "eyes"} <= set(rig.regions) and rig.lines:
         for name, value in stray_mm(rig).items():
             rows.append(Row("shapes", name, "moves outside its region mm", value, bar=(None, MOVES_MM)))

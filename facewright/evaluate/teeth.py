@@ -9,7 +9,8 @@ import igl
 import numpy as np
 from scipy.ndimage import binary_opening
 
-from facewright.evaluate.play import Player
+from facewright.conventions import SHUT_PAIRS, SHUT_SHAPES
+from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.rows import Row
 from facewright.evaluate.shapes import shape_names
 from facewright.mesh.adjacency import vertex_components
@@ -20,10 +21,11 @@ INSIDE = ("teeth_", "gums_", "tongue")
 VIEWS = ((0.0, 0.0), (-40.0, 0.0), (40.0, 0.0), (0.0, -25.0))
 SMILE = {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0, "jawOpen": 0.3}
 TONGUE = {"tongueOut": 1.0, "jawOpen": 0.5}
-TEETH_BAR, TONGUE_BAR_MM, POKE_BAR_MM2 = 6, 0.5, 0.5
+TEETH_BAR, TONGUE_BAR_MM, POKE_BAR_MM2, SLIT_BAR_MM2 = 6, 0.5, 0.5, 2.0
 SEEN_MM2 = 4.0  # a tooth counts as shown from this much of it on
 _STILL_MM = 0.05
 _MM_PER_PIXEL, _HALF_MM = 0.5, 45.0
+_SLIT_MM_PER_PIXEL = 0.25  # a slit twice as high is the least that is seen
 _LIPS_MM = 1.0  # a ray that meets something this little before it passes the lips has not been stopped by them
 
 
@@ -51,6 +53,7 @@ def measure_mouth(rig):
     tongue_out_mm     how far the tip lies before the lips there
     through_skin_mm2  pose -> largest area of teeth, gums or tongue seen past the lips rather than between them; every
                       single shape that moves the mouth, and mouth_pairs; a tongue that is out is left out
+    slit_mm2          pose -> area of what lies behind the lips that is seen between them from the front, in shut_poses
     teeth_moved_mm    most that an upper tooth moves under any target
     """
     singles = shape_names(rig)
@@ -67,6 +70,7 @@ def measure_mouth(rig):
         "tongue_in_lips_mm": tuple(mouth.tongue_in_flesh_mm() for mouth in tongue),
         "tongue_out_mm": tongue[0].tongue_out_mm(),
         "through_skin_mm2": through,
+        "slit_mm2": {name: _Mouth(rig, weights, True).slit_mm2() for name, weights in shut_poses(rig).items()},
         "teeth_moved_mm": max((float(np.abs(mesh.deltas).max()) for mesh in upper), default=0.0),
     }
 
@@ -80,6 +84,8 @@ def teeth_rows(rig):
     worst = max(through, key=through.get, default="")
     smile, tongue = "smile + jawOpen 0.3", "tongueOut + jawOpen 0.5"
     rows = [Row("teeth", worst, "through the skin mm2", through.get(worst, 0.0), bar=(None, POKE_BAR_MM2))]
+    for pose, area in found["slit_mm2"].items():
+        rows.append(Row("lips", pose, "slit seen mm2", area, bar=(None, SLIT_BAR_MM2)))
     rows.append(Row("teeth", "any", "upper teeth move mm", found["teeth_moved_mm"], bar=(None, 0.0)))
     if set(SMILE) <= set(rig.target_names):
         rows.append(Row("teeth", smile, "upper teeth shown", *found["teeth_shown"], bar=(TEETH_BAR, None)))
@@ -87,6 +93,14 @@ def teeth_rows(rig):
         rows.append(Row("tongue", tongue, "in the lips mm", *found["tongue_in_lips_mm"], bar=(None, TONGUE_BAR_MM)))
         rows.append(Row("tongue", tongue, "before the lips mm", found["tongue_out_mm"], bar=(0.0, None)))
     return rows
+
+
+def shut_poses(rig):
+    """name -> weights of the poses of a rig under which lips that are shut stay shut."""
+    names = shape_names(rig)
+    poses = {" + ".join(pose): dict.fromkeys(pose, 1.0) for pose in (*((name,) for name in SHUT_SHAPES), *SHUT_PAIRS)}
+    found = {name: both_sides(weights, names) for name, weights in poses.items()}
+    return {name: weights for name, weights in found.items() if weights is not None}
 
 
 def _with_jaw(name):
@@ -128,9 +142,9 @@ class _Mouth:
         self.upper, self.lower = (self.posed[0][rig.lines[f"lip_seam_{lip}"]] for lip in ("upper", "lower"))
         self.center = np.concatenate([self.upper, self.lower]).mean(axis=0)
 
-    def _seen(self, view):
+    def _seen(self, view, mm_per_pixel=_MM_PER_PIXEL):
         """Rays (origins, directions) of a view and what they meet first."""
-        pixels = round(2 * _HALF_MM / _MM_PER_PIXEL)
+        pixels = round(2 * _HALF_MM / mm_per_pixel)
         camera = Camera.looking_at(self.center, *view, _HALF_MM, (pixels, pixels))
         origins, directions = camera.rays()
         return origins, directions, self.scene.cast(origins, directions)
@@ -165,6 +179,16 @@ class _Mouth:
                 patches = binary_opening(outside.reshape(side, side), np.ones((2, 2)))
                 most = max(most, float(patches.sum()) * _MM_PER_PIXEL**2)
         return most
+
+    def slit_mm2(self):
+        """Area of the inner mouth and what it holds that is seen from the front."""
+        hits = self._seen(VIEWS[0], _SLIT_MM_PER_PIXEL)[2]
+        inner = np.zeros(len(self.faces) + 1, bool)  # the last is for rays that meet nothing
+        inner[: self.first_face[1]] = self.rig.regions["mouth_interior"][self.meshes[0].faces].all(axis=1)
+        inner[self.first_face[1] : -1] = True
+        side = round(np.sqrt(len(hits.face)))
+        seen = binary_opening(inner[hits.face].reshape(side, side), np.ones((2, 2)))
+        return float(seen.sum()) * _SLIT_MM_PER_PIXEL**2
 
     def tongue_in_flesh_mm(self):
         """Depth of the deepest tongue vertex between the outer skin and the mouth bag, the root apart."""

@@ -35,6 +35,7 @@ class Drawable:
     normal_map (h, w, 3) uint8, tangent space, +Y; both with uv (t, 2), v up, and uv_faces (m, 3)
     roughness  0..1: below about 0.5 a highlight shows
     opacity    0..1
+    shade      (n,) share of the light that comes so deep
     normals    (n, 3), default area-weighted vertex normals
     """
 
@@ -47,6 +48,7 @@ class Drawable:
     uv_faces: np.ndarray | None = None
     roughness: float = 0.7
     opacity: float = 1.0
+    shade: np.ndarray | None = None
     normals: np.ndarray | None = None
 
 
@@ -63,15 +65,15 @@ class Scene:
         self.first_face = np.cumsum([0] + [len(d.faces) for d in self.drawables])
         self._colors = np.concatenate([_vertex_colors(d) for d in self.drawables], dtype=np.float32)
         self._looks = [_Looks(d) for d in self.drawables]
-        self._stand([d.vertices for d in self.drawables], camera)
+        self._stand([d.vertices for d in self.drawables], [d.shade for d in self.drawables], camera)
 
-    def posed(self, vertices, camera=None):
-        """The Scene with other vertices: a sequence of (n, 3), one for each drawable."""
+    def posed(self, vertices, camera=None, shades=None):
+        """The Scene with other vertices: a sequence of (n, 3), one for each drawable; shades likewise, (n,) or None."""
         scene = copy.copy(self)
-        scene._stand(vertices, camera)
+        scene._stand(vertices, shades or [d.shade for d in self.drawables], camera)
         return scene
 
-    def _stand(self, vertices, camera):
+    def _stand(self, vertices, shades, camera):
         """Make ready what depends on the vertices."""
         every = np.concatenate(vertices)
         self._near = np.arange(len(self.faces)) if camera is None else camera.in_picture(every, self.faces)
@@ -85,7 +87,10 @@ class Scene:
                 normals.append(
                     _normals_of(now, drawable.faces, self._near[slice(*bounds[i : i + 2])] - self.first_face[i])
                 )
-        self._normals_colors = np.concatenate([np.concatenate(normals), self._colors], axis=1, dtype=np.float32)
+        light = [np.ones(len(now)) if shade is None else shade for now, shade in zip(vertices, shades)]
+        self._looks_at = np.concatenate(
+            [np.concatenate(normals), self._colors, np.concatenate(light)[:, None]], axis=1, dtype=np.float32
+        )
         self._frames = [looks.frames(now, normal) for looks, now, normal in zip(self._looks, vertices, normals)]
 
     def render(self, camera, *, unlit=False, background=BACKGROUND):
@@ -137,8 +142,8 @@ class Scene:
 
     def _shade(self, face, barycentric, camera, pixel_mm, unlit):
         """Linear colours (k, 3) and opacities (k,) at hits."""
-        mixed = _mix(self._normals_colors, self.faces[face], barycentric)
-        normal, color = normalized(mixed[:, :3]), mixed[:, 3:]
+        mixed = _mix(self._looks_at, self.faces[face], barycentric)
+        normal, color, shade = normalized(mixed[:, :3]), mixed[:, 3:6], mixed[:, 6:]
         opacity = np.ones(len(face), np.float32)
         gloss = np.zeros(len(face), np.float32)
         owner = np.searchsorted(self.first_face, face, side="right") - 1
@@ -157,7 +162,7 @@ class Scene:
                     normal[chosen] = looks.bent(frames, normal[chosen], local, barycentric[chosen], uv, pixel_mm)
         if unlit:
             return color, opacity
-        return _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
+        return shade * _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
 
 
 class _Looks:

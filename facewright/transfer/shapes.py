@@ -189,10 +189,8 @@ def _carry_bones(template, V, rotation, result):
             joint = rotation @ _joint(template, part.attach)
             similarity = best_similarity(_aligned(template, ball, rotation)[0], V[ball.vertex_slice])
             turns, pivots = _turns(*_aligned(template, ball, rotation)), (joint, _map(similarity, joint))
-        elif part.attach == "skull":
-            turns, pivots = still, hinge
         else:
-            continue
+            continue  # the skull rests under every shape
         result[:, part.vertex_slice] = _turned(source, target, deltas, turns, pivots, similarity[1])
 
 

@@ -1,4 +1,4 @@
-"""Shapes that stay where they belong: each fades out towards the border of its region in the working set."""
+"""Shapes that stay what they are: within their regions and their amplitudes in the working set."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from facewright.transfer.eyeball import carried_eyeball
 from facewright.working_set import read_working_set, region_depth
 
 FADE_MM = 6.0
+SCALED = ("mouth", "cheek", "brow")  # regions whose shapes go along straight lines; eyes and jaws turn
+MARGIN = 0.03  # of an amplitude, left for what contact adds or takes
 
 
 def keep_within_regions(face, deltas):
@@ -20,8 +22,7 @@ def keep_within_regions(face, deltas):
     words = read_working_set()
     skin = face.template.skin.vertex_slice
     outer = face.regions["outer"][skin]
-    centers = [carried_eyeball(face.template, face.vertices, side).center for side in ("left", "right")]
-    scale = INTERPUPILLARY_MM / float(np.linalg.norm(centers[0] - centers[1]))
+    scale = _scale(face)
     result = np.array(deltas)
     fades = {}
     for i, name in enumerate(face.template.shape_names):
@@ -35,3 +36,27 @@ def keep_within_regions(face, deltas):
             fades[key] = np.where(outer, share * share * (3 - 2 * share), 1.0)[:, None]
         result[i, skin] *= fades[key]
     return result
+
+
+def keep_within_amplitudes(face, deltas):
+    """Shapes (s, n, 3) mm of a data.Face scaled so far as they are weaker or stronger than the working set says."""
+    words, scale = read_working_set().words, _scale(face)
+    outer = face.regions["outer"]
+    seam = face.lines["lip_seam_upper"]  # from the person's right to the left
+    result = np.array(deltas)
+    for shape, name in zip(result, face.template.shape_names):
+        word = words.get(name)
+        if word is None or word.region not in SCALED:
+            continue
+        at = seam[[-1 if word.side == "left" else 0]] if word.at == "corner" else outer
+        amplitude = float(np.linalg.norm(shape[at], axis=1).max(initial=0.0)) * scale
+        if amplitude > 0.0:
+            least, most = word.amplitude
+            shape *= np.clip(amplitude, (1.0 + MARGIN) * least, (1.0 - MARGIN) * most) / amplitude
+    return result
+
+
+def _scale(face):
+    """Factor that brings a head to 63 mm between the eyes."""
+    centers = [carried_eyeball(face.template, face.vertices, side).center for side in ("left", "right")]
+    return INTERPUPILLARY_MM / float(np.linalg.norm(centers[0] - centers[1]))

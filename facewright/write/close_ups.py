@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.conventions import MOUTH_PAIRS
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
 from facewright.evaluate.play import both_sides
 from facewright.evaluate.shapes import shape_names, with_base
 from facewright.mesh.raster import Camera
@@ -13,7 +13,6 @@ from facewright.write.sheet import Cell, Section
 WEIGHTS = (0.5, 1.0)
 SIZE = (152, 292)  # (height, width) in pixels
 COLUMNS = 6
-EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
 _UPPER, _MIDDLE = ("eye", "brow"), ("cheekSquint", "noseSneer")  # what is looked at; the rest is the mouth's
 
 

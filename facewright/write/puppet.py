@@ -10,6 +10,8 @@ from facewright.write.sheet import PANEL
 
 BACKGROUND = tuple(c / 255.0 for c in PANEL)
 INNER_SHADE = 0.45
+MOUTH_LIGHT_MM = 18.0  # behind the lips, where half of the light is left
+BEHIND_LIPS = ("teeth_", "gums_", "tongue")
 CLAY_MAP_PX = 256
 
 
@@ -17,13 +19,14 @@ class Puppet:
     """A Rig that stands ready: a pose only moves what it moves."""
 
     def __init__(self, rig, textured=False):
-        self._meshes = shown_meshes(rig, textured)
+        self._rig, self._textured, self._meshes = rig, textured, shown_meshes(rig, textured)
         self._players = {full: Player(rig, full) for full in (True, False)}
         self.scene = Scene(rig_drawables(rig, textured))
 
     def posed(self, weights, camera, full=True):
         """The Scene under dict shape -> weight, for one camera; full: with in-betweens and correctives."""
-        return self.scene.posed(self._players[full].meshes(self._meshes, weights), camera)
+        vertices = self._players[full].meshes(self._meshes, weights)
+        return self.scene.posed(vertices, camera, None if self._textured else mouth_shades(self._rig, vertices))
 
     def picture(self, weights, camera, full=True):
         """(h, w, 3) uint8 of a pose on the ground of a contact sheet."""
@@ -42,8 +45,9 @@ def shown_meshes(rig, textured):
 
 def rig_drawables(rig, textured):
     """A Drawable for each of shown_meshes. Clay keeps the colours of eyes, teeth and tongue."""
-    drawables = []
-    for mesh in shown_meshes(rig, textured):
+    drawables, meshes = [], shown_meshes(rig, textured)
+    shades = [None] * len(meshes) if textured else mouth_shades(rig, [mesh.vertices for mesh in meshes])
+    for mesh, shade in zip(meshes, shades):
         material = mesh.material
         looks = {"color": material.color, "roughness": material.roughness, "opacity": material.alpha}
         if textured:
@@ -57,8 +61,30 @@ def rig_drawables(rig, textured):
                 "uv": mesh.uv,
                 "uv_faces": mesh.uv_faces,
             }
-        drawables.append(Drawable(mesh.vertices, mesh.faces, **looks))
+        drawables.append(Drawable(mesh.vertices, mesh.faces, shade=shade, **looks))
     return drawables
+
+
+def mouth_shades(rig, vertices):
+    """A share of the light (n,), or None for all of it, for each mesh that clay shows: less light comes deep into a
+    mouth. vertices: the posed (n, 3) of shown_meshes, the skin first.
+    """
+    skin, inside = vertices[0], rig.regions.get("mouth_interior")
+    shades = [
+        _shade(rig, skin, now) if mesh.name.startswith(BEHIND_LIPS) else None
+        for mesh, now in zip(shown_meshes(rig, textured=False), vertices)
+    ]
+    if inside is not None:
+        shades[0] = np.ones(len(skin))
+        shades[0][inside] = _shade(rig, skin, skin[inside])
+    return shades
+
+
+def _shade(rig, skin, points):
+    """(k,) share of the light that reaches points (k, 3) behind the lips of a posed skin (n, 3)."""
+    lips = [skin[line[len(line) // 2], 2] for name, line in rig.lines.items() if name.startswith("lip_seam")]
+    depth = np.maximum((max(lips) if lips else points[:, 2]) - points[:, 2], 0.0)
+    return 1.0 / (1.0 + (depth / MOUTH_LIGHT_MM) ** 2)
 
 
 def _clay_with_dark_inside(rig):

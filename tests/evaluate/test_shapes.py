@@ -9,7 +9,15 @@ from facewright.evaluate.blends import possible, random_blends, random_mixes
 from facewright.evaluate.eyes import margin_gap_mm
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.rows import Row, worst_rows
-from facewright.evaluate.shapes import EYE_OPENING_MM, amplitudes, measure_shapes, mirror_mm, stray_mm
+from facewright.evaluate.shapes import (
+    EYE_OPENING_MM,
+    amplitudes,
+    crossings,
+    measure_shapes,
+    mirror_mm,
+    shape_rows,
+    stray_mm,
+)
 from facewright.parts import build_rig
 from facewright.working_set import read_working_set
 
@@ -43,6 +51,22 @@ def test_a_face_turned_over_is_found(rig):
 def test_still_shapes_are_sound(rig):
     figures = measure_shapes(with_delta(rig, "mouthPucker", np.zeros_like(rig.meshes[0].vertices)))
     assert figures["mouthPucker"] == {"max_mm": 0.0, "folded": 0, "torn": 0, "self_intersections": 0}
+
+
+def test_crossings_beyond_the_templates_own_are_missed(rig):
+    skin = rig.meshes[0]
+    delta = np.zeros_like(skin.vertices)
+    upper = rig.regions["lip_upper"]
+    delta[upper] = [0.0, -6.0, 0.0]  # through the lower lip
+    crossed = with_delta(rig, "mouthPucker", delta)
+    found = crossings(crossed)
+    assert found["mouthPucker"] > 0 and found["jawOpen"] == 0
+
+    def row(own):
+        rows = shape_rows(crossed, own)
+        return next(r for r in rows if (r.pose, r.figure) == ("mouthPucker", "new self-intersections"))
+
+    assert row(found).met and not row({}).met and not row(None).has_bar
 
 
 def test_motion_beyond_the_region_is_stray(rig):

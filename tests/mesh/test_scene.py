@@ -33,6 +33,13 @@ def test_transparency_mixes_linear_light():
     np.testing.assert_allclose(image[20, 20], expected, atol=1)
 
 
+def test_shade_takes_light_and_gloss_alike():
+    looks = {"color": RED, "roughness": 0.2}
+    bright, dark = (Scene([square(**looks, shade=np.full(4, share))]).render(CAMERA)[20, 20] for share in (1.0, 0.0))
+    assert (bright == Scene([square(**looks)]).render(CAMERA)[20, 20]).all()
+    assert bright.max() > 100 and not dark.any()
+
+
 def test_texture_stands_upright_and_its_fourth_channel_is_opacity():
     texture = np.zeros((2, 2, 4), np.uint8)
     texture[0, 0] = (255, 0, 0, 255)  # top left: v near 1

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.data import Face
-from facewright.transfer import keep_within_regions
+from facewright.transfer import keep_within_amplitudes, keep_within_regions
 from facewright.working_set import read_working_set, region_depth
 
 
@@ -35,3 +35,22 @@ def test_left_is_the_mirror_of_right(hm08):
     assert np.allclose(left[mirror], right, atol=1e-6)
     near = cKDTree(skin[hm08.lines["lid_lower_left"]]).query(skin)[0] < 5.0
     assert left[near].min() > 0.0
+
+
+def test_what_is_too_weak_or_too_strong_is_scaled_and_the_rest_is_not(hm08):
+    V, seen = hm08.vertices, np.ones(len(hm08.vertices), bool)
+    face = Face(hm08, V, V, hm08.regions, hm08.lines, seen, {}, {"left": False, "right": False}, {})
+    names = list(hm08.shape_names)
+    deltas = np.array(hm08.deltas)
+    weak, strong, jaw = (names.index(name) for name in ("mouthSmileLeft", "browInnerUp", "jawOpen"))
+    deltas[weak] *= 0.5
+    deltas[strong] *= 3.0
+    deltas[jaw] *= 0.1
+    kept = keep_within_amplitudes(face, deltas)
+    words, scale = read_working_set().words, 63.0 / 62.5
+    corner = hm08.lines["lip_seam_upper"][-1]
+    assert np.linalg.norm(kept[weak, corner]) * scale > words["mouthSmileLeft"].amplitude[0]
+    outer = hm08.regions["outer"]
+    assert np.linalg.norm(kept[strong, outer], axis=1).max() * scale < words["browInnerUp"].amplitude[1]
+    assert np.array_equal(kept[jaw], deltas[jaw])
+    assert np.allclose(kept[names.index("mouthFrownLeft")], hm08.deltas[names.index("mouthFrownLeft")])

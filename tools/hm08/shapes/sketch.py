@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hm08.shapes.folds import Fold
+from hm08.shapes.wrinkles import LipLines
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -31,6 +32,7 @@ class Studio:
     def __init__(self, canvas, folds):
         self.canvas = canvas
         self.folds = {name: Fold(canvas, through) for name, through in folds.items()}
+        self.lip_lines = LipLines(canvas.head)
 
     def field(self, sketch):
         """(n, 3) displacement of a sketch: of both sides where it is symmetric or tells of the right one too."""
@@ -47,6 +49,9 @@ class Studio:
         for fold in sketch.get("folds", []):
             values = {key: value for key, value in fold.items() if key != "line"}
             left = self.folds[fold["line"]](canvas.V + field, canvas.F, **values)
+            field = field + left + left[canvas.mirror] * FLIP
+        if "lip_lines_mm" in sketch:
+            left = self.lip_lines(canvas.V + field, canvas.F, sketch["lip_lines_mm"])
             field = field + left + left[canvas.mirror] * FLIP
         return field if other else symmetric_field(field, canvas.mirror)
 

@@ -1,0 +1,37 @@
+"""The tongue lies low in an open mouth; its tip and everything else go as before."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from facewright.contact import TongueOptions, lay_tongue
+from facewright.parts import fit_parts
+from facewright.transfer import transfer_shapes
+
+
+def test_the_back_sinks_and_the_tip_stays(hm08_person):
+    face = fit_parts(hm08_person(5))
+    deltas = transfer_shapes(face)
+    laid = lay_tongue(face, deltas)
+    number, tongue = face.template.shape_names.index("jawOpen"), face.template.part("tongue").vertex_slice
+    change = laid[number] - deltas[number]
+    others = np.ones(len(change), bool)
+    others[tongue] = False
+    assert not change[others].any()
+    assert (np.delete(laid, number, axis=0) == np.delete(deltas, number, axis=0)).all()
+    rest = face.vertices[tongue]
+    tip = rest[:, 2] > np.quantile(rest[:, 2], 0.9)
+    assert not change[tongue][tip].any()
+    posed = (face.vertices + laid[number])[tongue]
+    upper, lower = ((face.vertices + laid[number])[face.lines[f"lip_seam_{lip}"]][:, 1] for lip in ("upper", "lower"))
+    share = TongueOptions().share
+    body = (rest[:, 2] > np.quantile(rest[:, 2], 0.3)) & ~tip
+    assert posed[body, 1].max() < lower.min() + (share + 0.1) * (upper.max() - lower.min())
+    assert change[tongue][:, 1].min() < -3.0
+
+
+def test_without_a_jaw_nothing_changes(hm08_person):
+    face = hm08_person(5)
+    template = replace(face.template, shape_names=("mouthPucker",), deltas=face.template.deltas[:1])
+    deltas = np.zeros((1, *face.vertices.shape))
+    assert lay_tongue(replace(face, template=template), deltas) is deltas
