@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.contact.bag import MouthBag
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
@@ -83,13 +84,14 @@ def solve_mouth(face, targets, options=None, jobs=1):
     """
     mouth = _Mouth(face, options or MouthOptions(), jobs)
     result = mouth.with_arc(targets)
-    result = mouth.with_flat_corners(result)
-    result = mouth.with_single_shapes(result)
+    result = mouth.with_single_shapes(mouth.with_flat_corners(result))
+    flat = mouth.with_flat_corners(result)  # what contact folds is laid flat once more
+    result = mouth.with_single_shapes(flat, changed_from=result)
     result = mouth.with_both_sides(result)
     result = mouth.with_halves(result)
     result = mouth.with_mouth_close(result)
     result = mouth.with_pairs(result)
-    result = mouth.with_tongue(result)
+    result = mouth.with_bag(mouth.with_tongue(result))
     return result.evened(face.template.mirror) if _is_even(face) else result
 
 
@@ -129,9 +131,11 @@ class _Mouth:
         extras = targets.extras | {half: jaw.half_open(self.face.vertices, opened, HALF)}
         return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
 
-    def with_single_shapes(self, targets):
-        """Targets of which each by itself keeps the lips apart on its whole way."""
+    def with_single_shapes(self, targets, changed_from=None):
+        """Targets of which each by itself keeps the lips apart on its whole way; asks those that differ from changed_from."""
         names = self._lip_shapes(targets)
+        if changed_from is not None:
+            names = [name for name in names if (targets.delta(name) != changed_from.delta(name)).any()]
         lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
         for name, lack in zip(names, lacks):
             targets = _added(targets, lack, {name: 1.0})
@@ -203,6 +207,32 @@ class _Mouth:
                 name = corrective_name(drivers)
                 extras[name], correctives[name] = share * lack, drivers
         return replace(targets, extras=extras, correctives=correctives)
+
+    def with_bag(self, targets):
+        """Targets of which none, and no pair, draws outer skin over the mouth's lining."""
+        regions, skin = self.face.regions, self.face.vertices[self.skin]
+        inner, outer = regions["mouth_interior"][self.skin], regions["outer"][self.skin]
+        bag = MouthBag(skin, self.faces, self.seams, inner, outer)
+
+        def tucked(pose):
+            return bag.tucked(skin + targets.motion(pose)[self.skin])
+
+        poses = {name: {name: 1.0} for name in self._lip_shapes(targets)}
+        if {"mouthClose", "jawOpen"} <= set(targets.names):
+            poses["mouthClose"] = {"mouthClose": 1.0, "jawOpen": 1.0}
+        deltas, extras = np.array(targets.deltas), dict(targets.extras)
+        for name, push in zip(poses, self._each(tucked, poses.values())):
+            deltas[targets.names.index(name), self.skin] += push
+            for weight, step in targets.in_betweens.get(name, {}).items():
+                extras[step] = np.array(extras[step])
+                extras[step][self.skin] += weight * push
+        targets = replace(targets, deltas=deltas, extras=extras)
+        drivers = [names for names in targets.correctives.values() if set(names) <= set(poses)]
+        for names, push in zip(drivers, self._each(lambda names: tucked(dict.fromkeys(names, 1.0)), drivers)):
+            name = corrective_name(names)
+            extras[name] = np.array(extras[name])
+            extras[name][self.skin] += push
+        return replace(targets, extras=extras)
 
     def with_tongue(self, targets):
         """Targets with a corrective for a tongue that comes out of an open mouth.

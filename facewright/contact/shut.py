@@ -23,11 +23,11 @@ class ShutOptions:
     rounds     of wishes
     """
 
-    overlap_mm: float = 0.0
-    touch_mm: float = 0.15
+    overlap_mm: float = 0.05
+    touch_mm: float = 0.1
     inside_mm: float = 2.0
     outside_mm: float = 9.0
-    pitch_deg: float = 2.0
+    pitch_deg: float = 4.0
     smooth_mm: float = 4.0
     reach_mm: float = 9.0
     rounds: int = 5

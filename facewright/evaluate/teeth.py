@@ -51,8 +51,8 @@ def measure_mouth(rig):
     teeth_shown       (full, plain) upper teeth of which 4 mm2 or more are seen from the front at smile + jawOpen 0.3
     tongue_in_lips_mm (full, plain) of the deepest tongue vertex inside the flesh at tongueOut + jawOpen 0.5
     tongue_out_mm     how far the tip lies before the lips there
-    through_skin_mm2  pose -> largest area of teeth, gums or tongue seen past the lips rather than between them; every
-                      single shape that moves the mouth, and mouth_pairs; a tongue that is out is left out
+    through_skin_mm2  pose -> largest area of teeth, gums, tongue or lining seen past the lips rather than between them;
+                      every single shape that moves the mouth, and mouth_pairs; a tongue that is out is left out
     slit_mm2          pose -> area of what lies behind the lips that is seen between them from the front, in shut_poses
     teeth_moved_mm    most that an upper tooth moves under any target
     """
@@ -139,6 +139,8 @@ class _Mouth:
         self.faces = np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, start)])
         self.first_face = np.cumsum([0] + [len(mesh.faces) for mesh in meshes])
         self.scene = RayScene(np.concatenate(self.posed), self.faces)
+        self.lining = np.zeros(len(self.faces) + 1, bool)  # the last is for rays that meet nothing
+        self.lining[: self.first_face[1]] = rig.regions["mouth_interior"][meshes[0].faces].all(axis=1)
         self.upper, self.lower = (self.posed[0][rig.lines[f"lip_seam_{lip}"]] for lip in ("upper", "lower"))
         self.center = np.concatenate([self.upper, self.lower]).mean(axis=0)
 
@@ -168,7 +170,7 @@ class _Mouth:
         for view in VIEWS:
             origins, directions, hits = self._seen(view)
             number = np.searchsorted(self.first_face, hits.face, side="right") - 1
-            inner = np.flatnonzero((number > 0) & ~self.may_pass[number])
+            inner = np.flatnonzero(((number > 0) | self.lining[hits.face]) & ~self.may_pass[number])
             if len(inner):
                 gate = RayScene(*opening).cast(origins[inner], directions[inner])
                 passed = (gate.face >= 0) & (gate.distance < hits.distance[inner] + _LIPS_MM)
@@ -183,8 +185,7 @@ class _Mouth:
     def slit_mm2(self):
         """Area of the inner mouth and what it holds that is seen from the front."""
         hits = self._seen(VIEWS[0], _SLIT_MM_PER_PIXEL)[2]
-        inner = np.zeros(len(self.faces) + 1, bool)  # the last is for rays that meet nothing
-        inner[: self.first_face[1]] = self.rig.regions["mouth_interior"][self.meshes[0].faces].all(axis=1)
+        inner = np.array(self.lining)
         inner[self.first_face[1] : -1] = True
         side = round(np.sqrt(len(hits.face)))
         seen = binary_opening(inner[hits.face].reshape(side, side), np.ones((2, 2)))

@@ -1,0 +1,83 @@
+"""The mouth's lining stays in the head: where a shape draws chin or cheek over it, it gives way inwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.normals import vertex_normals
+
+
+@dataclass(frozen=True)
+class BagOptions:
+    """flesh_mm  left between lining and outer skin, or half of what is there at rest
+    least_mm  lining less deep at rest is not asked
+    lip_mm    from the seam: lining that belongs to the lips
+    face_mm   from the seam: outer skin that the lining could come out of
+    most_mm   deeper than this nothing comes out
+    rounds    of giving way
+    """
+
+    flesh_mm: float = 1.5
+    least_mm: float = 0.5
+    lip_mm: float = 8.0
+    face_mm: float = 60.0
+    most_mm: float = 12.0
+    rounds: int = 6
+
+
+_NOTHING_MM = 0.01
+_SAMPLES = np.array([[i, j, 4 - i - j] for i in range(5) for j in range(5 - i)]) / 4.0  # barycentric
+
+
+class MouthBag:
+    """The lining of one mouth, asked at its vertices and within its faces, which are large.
+
+    vertices (n, 3) of the skin at rest, faces (m, 3); seams two lines; inner, outer (n,) bool: lining, and seen skin
+    """
+
+    def __init__(self, vertices, faces, seams, inner, outer, options=None):
+        self.options = options or BagOptions()
+        away = cKDTree(vertices[np.concatenate(seams)]).query(vertices)[0]
+        self.free = inner & (away > self.options.lip_mm)
+        self.faces = faces
+        self.patch = faces[(outer & (away < self.options.face_mm))[faces].all(axis=1)]
+        mine = faces[self.free[faces].all(axis=1)]
+        self.corners = np.repeat(mine, len(_SAMPLES), axis=0)
+        self.shares = np.tile(_SAMPLES, (len(mine), 1))
+        self._rim = border_vertices(self.patch, len(vertices))
+        depth = np.nan_to_num(-self._heights(vertices)[0], posinf=0.0)
+        near = (depth > self.options.least_mm) & (depth < self.options.most_mm)
+        self.corners, self.shares = self.corners[near], self.shares[near]
+        self._wanted = np.clip(0.5 * depth[near], 0.0, self.options.flesh_mm)
+
+    def tucked(self, skin):
+        """(n, 3) displacement that brings the lining of a pose (n, 3) back behind the outer skin."""
+        moved = np.array(skin)
+        for _ in range(self.options.rounds):
+            height, normal = self._heights(moved)
+            over = height + self._wanted
+            out = np.flatnonzero((over > _NOTHING_MM) & (height < self.options.most_mm))
+            if not len(out):
+                break
+            shares = self.shares[out]
+            pull = shares / (shares**2).sum(axis=1, keepdims=True) * over[out, None]
+            total, count = np.zeros_like(skin), np.zeros(len(skin))
+            np.add.at(total, self.corners[out], -(pull * shares)[..., None] * normal[out, None])
+            np.add.at(count, self.corners[out], shares)
+            moved += total / np.maximum(count, 1e-9)[:, None]
+        return moved - skin
+
+    def _heights(self, skin):
+        """(k,) how far the samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
+        points = np.einsum("kc,kcd->kd", self.shares, skin[self.corners])
+        found = Surface(skin, self.patch).closest(points)
+        normal = interpolate(vertex_normals(skin, self.faces), self.patch, found.faces, found.barycentric)
+        height = ((points - found.points) * normal).sum(axis=1)
+        # Past the rim of the lips no skin lies before the lining.
+        beyond = (self._rim[self.patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
+        return np.where(beyond, -np.inf, height), normal

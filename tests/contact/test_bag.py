@@ -1,0 +1,31 @@
+"""Lining that a shape would leave outside is taken back; what is inside stays."""
+
+import numpy as np
+import pytest
+
+from facewright.contact.bag import MouthBag
+
+
+@pytest.fixture(scope="module")
+def bag(hm08):
+    skin = hm08.skin.vertex_slice
+    V, F = hm08.vertices[skin], hm08.faces[hm08.skin.face_slice]
+    seams = hm08.lines["lip_seam_upper"], hm08.lines["lip_seam_lower"]
+    return V, MouthBag(V, F, seams, hm08.regions["mouth_interior"][skin], hm08.regions["outer"][skin])
+
+
+def test_the_neutral_stays(bag):
+    V, lining = bag
+    assert not lining.tucked(V).any()
+
+
+def test_what_comes_out_goes_back_and_outer_skin_stays(bag, hm08):
+    V, lining = bag
+    outer = hm08.regions["outer"][hm08.skin.vertex_slice]
+    chin = outer & (np.abs(V[:, 0]) < 15) & (V[:, 1] < -80) & (V[:, 1] > -105) & (V[:, 2] > 0)
+    pressed = V.copy()
+    pressed[chin, 2] -= 7.0
+    before = lining._heights(pressed)[0].max()
+    push = lining.tucked(pressed)
+    assert before > 0.5 and lining._heights(pressed + push)[0].max() < 0.1
+    assert not push[outer].any() and np.abs(push).max() < 12.0
