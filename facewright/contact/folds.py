@@ -9,7 +9,7 @@ import numpy as np
 from facewright.mesh.folds import laid_flat
 from facewright.transfer.shapes import CORRECTIVE_BASE
 
-_SEAM_EASE = 0.2  # of the line where the lips meet
+SEAM_MOBILITY = 0.2  # of the line where the lips meet
 _MOVES_MM = 1e-3
 
 
@@ -28,7 +28,7 @@ def lay_flat(face, targets):
     ease = (~face.regions["mouth_interior"][at]).astype(float)
     for name, line in face.lines.items():
         if name.startswith("lip_seam"):
-            ease[line] = _SEAM_EASE
+            ease[line] = SEAM_MOBILITY
         elif name.startswith("lid_") or name == "neck_ring":
             ease[line] = 0.0
 

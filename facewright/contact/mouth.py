@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.contact.bag import MouthBag
+from facewright.contact.folds import SEAM_MOBILITY
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
@@ -20,7 +21,7 @@ from facewright.conventions import (
     in_between_name,
     mirrored_name,
 )
-from facewright.mesh.folds import laid_flat, neighbour_mean
+from facewright.mesh.folds import laid_flat
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
 
@@ -132,7 +133,7 @@ class _Mouth:
         return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
 
     def with_single_shapes(self, targets, changed_from=None):
-        """Targets of which each by itself keeps the lips apart on its whole way; asks those that differ from changed_from."""
+        """Targets of which each by itself keeps the lips apart on its whole way; those as in changed_from are not asked."""
         names = self._lip_shapes(targets)
         if changed_from is not None:
             names = [name for name in names if (targets.delta(name) != changed_from.delta(name)).any()]
@@ -153,14 +154,14 @@ class _Mouth:
     def with_flat_corners(self, targets):
         """Targets of which none folds the skin around the lips, as where both pull at the small faces of a corner."""
         skin = self.face.vertices[self.skin]
-        mean = neighbour_mean(self.faces, len(skin), self.seams)
         away = cKDTree(skin[np.concatenate(self.seams)]).query(skin)[0]
-        keep = away > self.options.flat_mm
+        mobility = (away <= self.options.flat_mm).astype(float)
+        mobility[np.concatenate(self.seams)] = SEAM_MOBILITY
         deltas = np.array(targets.deltas)
 
         def flat(name):
             moved = skin + targets.delta(name)[self.skin]
-            return laid_flat(skin, moved, self.faces, keep, mean) - moved
+            return laid_flat(skin, moved, self.faces, mobility) - moved
 
         names = self._lip_shapes(targets)
         for name, change in zip(names, self._each(flat, names)):

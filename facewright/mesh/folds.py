@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
-from facewright.mesh.adjacency import dilate, vertex_adjacency
+from facewright.mesh.adjacency import dilate
 from facewright.mesh.normals import face_areas, face_cross, face_normals
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
-_LEAST_SHARE = (
-    0.1  # of its area at rest that a face keeps, seen along the normal it should have, where folds are undone
-)
+_LEAST_SHARE = 0.1  # of its area at rest that a face keeps, seen along the normal that it should have
 _RINGS = 3  # around folds that may give way
 _SWEEPS = 25  # between two looks at what should look where
 _STEP, _FARTHEST = 0.2, 1.5  # of an edge: how far a vertex gives way in a sweep, and in all
@@ -54,22 +51,6 @@ def _vertex_covariance(neutral, moved, faces):
     for corner in range(3):
         np.add.at(total, faces[:, corner], outer)
     return total
-
-
-def neighbour_mean(faces, n, lines=()):
-    """(n, n) csr: the middle of each vertex's neighbours. Inner vertices of lines have only each other for neighbours,
-    so that a line stays smooth."""
-    A = vertex_adjacency(faces, n).tocoo()
-    inner = np.zeros(n, bool)
-    rows, columns = [], []
-    for line in lines:
-        inner[line[1:-1]] = True
-        rows += [line[1:-1], line[1:-1]]
-        columns += [line[:-2], line[2:]]
-    kept = ~inner[A.row]
-    rows, columns = np.concatenate([A.row[kept], *rows]), np.concatenate([A.col[kept], *columns])
-    W = sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)).tocsr()
-    return (sp.diags(1.0 / np.maximum(np.asarray(W.sum(axis=1)).ravel(), 1.0)) @ W).tocsr()
 
 
 def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
