@@ -8,10 +8,10 @@ from facewright.evaluate.eyes import eye_poses
 from facewright.evaluate.play import Player
 from facewright.evaluate.rows import Row
 from facewright.evaluate.shapes import shape_names
-from facewright.mesh.adjacency import unique_edges
+from facewright.mesh.adjacency import border_edges
 from facewright.mesh.closest import Surface, interpolate
 
-ROOT_MM = 0.05  # this near to the skin at rest are roots, where neighbours are as near: a lone tip only touches it
+ROOT_MM = 0.05  # edges of cards whose ends are this near to the skin at rest are roots; a tip may touch it too
 LASH_BAR_MM = 0.2
 STEPS = (0.25, 0.5, 0.75, 1.0)
 
@@ -53,7 +53,7 @@ class _Lashes:
         self.rig, self.mesh, self.skin = rig, mesh, rig.meshes[0]
         found = Surface(self.skin.vertices, self.skin.faces).closest(mesh.vertices)
         near = found.distance <= ROOT_MM
-        edges = unique_edges(mesh.faces)
+        edges = border_edges(mesh.faces)
         self.roots = np.unique(edges[near[edges].all(axis=1)])
         self.faces, self.barycentric = found.faces[self.roots], found.barycentric[self.roots]
 

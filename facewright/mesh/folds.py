@@ -66,24 +66,30 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
     near = np.zeros(len(moved), bool)
     near[faces[folded]] = True
     near = dilate(near, faces, _RINGS)
-    asked = np.flatnonzero(near[faces].all(axis=1))
-    edge = float(np.sqrt(2.0 * face_areas(neutral, faces[asked]).mean()))
-    least = _LEAST_SHARE * face_areas(neutral, faces[asked])
-    ease = np.where(near, mobility, 0.0)
-    now, best, fewest = np.array(moved), moved, len(folded)
+    # What is expected of a face depends on the ring around it, which is looked at and stays.
+    around = dilate(near, faces, 1)
+    used, local = np.unique(faces[around[faces].all(axis=1)], return_inverse=True)
+    local = local.reshape(-1, 3)
+    rest, start, ease = neutral[used], moved[used], np.where(near, mobility, 0.0)[used]
+    asked = np.flatnonzero(near[used][local].all(axis=1))
+    area = face_areas(rest, local[asked])
+    edge, least = float(np.sqrt(2.0 * area.mean())), _LEAST_SHARE * area
+    now, best, fewest = start, start, len(folded)
     for _ in range(rounds):
-        normals = _expected_normals(neutral, now, faces, asked)
+        normals = _expected_normals(rest, now, local, asked)
         for _ in range(_SWEEPS):
-            way = _way_back(now, faces[asked], normals, least, ease)
+            way = _way_back(now, local[asked], normals, least, ease)
             if way is None:
                 break
-            now = moved + _shortened(now + _shortened(way, _STEP * edge) - moved, _FARTHEST * edge)
-        left = len(folded_by_shape(neutral, now, faces[asked]))
+            now = start + _shortened(now + _shortened(way, _STEP * edge) - start, _FARTHEST * edge)
+        left = len(folded_by_shape(rest, now, local, near[used][local].all(axis=1)))
         if left < fewest:
             best, fewest = now, left
         if not left:
             break
-    return best
+    result = np.array(moved)
+    result[used] = best
+    return result
 
 
 def _shortened(vectors, longest):
