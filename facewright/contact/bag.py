@@ -16,22 +16,22 @@ from facewright.mesh.normals import vertex_normals
 class BagOptions:
     """flesh_mm  left between lining and outer skin, or half of what is there at rest
     least_mm  lining less deep at rest is not asked
-    lip_mm    from the seam: lining that belongs to the lips
-    face_mm   from the seam: outer skin that the lining could come out of
+    lip_mm    from the seam: lining that belongs to the lips and stays, and lining that gives way freely
+    face_mm   from the seam: outer skin that the lining could come out of; lips roll in and out before it
     most_mm   deeper than this nothing comes out
     rounds    of giving way
     """
 
-    flesh_mm: float = 1.5
+    flesh_mm: float = 0.5
     least_mm: float = 0.5
-    lip_mm: float = 8.0
-    face_mm: float = 60.0
+    lip_mm: tuple[float, float] = (8.0, 18.0)
+    face_mm: tuple[float, float] = (11.0, 60.0)
     most_mm: float = 12.0
     rounds: int = 6
 
 
-_NOTHING_MM = 0.01
-_SAMPLES = np.array([[i, j, 4 - i - j] for i in range(5) for j in range(5 - i)]) / 4.0  # barycentric
+_NOTHING_MM, _LEAST_SHARE = 0.01, 0.1
+_SAMPLES = np.array([[i, j, 3 - i - j] for i in range(4) for j in range(4 - i)]) / 3.0  # barycentric
 
 
 class MouthBag:
@@ -43,10 +43,12 @@ class MouthBag:
     def __init__(self, vertices, faces, seams, inner, outer, options=None):
         self.options = options or BagOptions()
         away = cKDTree(vertices[np.concatenate(seams)]).query(vertices)[0]
-        self.free = inner & (away > self.options.lip_mm)
+        stays, gives = self.options.lip_mm
+        self.free = inner * np.clip((away - stays) / (gives - stays), 0.0, 1.0)
         self.faces = faces
-        self.patch = faces[(outer & (away < self.options.face_mm))[faces].all(axis=1)]
-        mine = faces[self.free[faces].all(axis=1)]
+        least, most = self.options.face_mm
+        self.patch = faces[(outer & (away > least) & (away < most))[faces].all(axis=1)]
+        mine = faces[inner[faces].all(axis=1) & (self.free[faces] > 0.0).any(axis=1)]
         self.corners = np.repeat(mine, len(_SAMPLES), axis=0)
         self.shares = np.tile(_SAMPLES, (len(mine), 1))
         self._rim = border_vertices(self.patch, len(vertices))
@@ -65,7 +67,8 @@ class MouthBag:
             if not len(out):
                 break
             shares = self.shares[out]
-            pull = shares / (shares**2).sum(axis=1, keepdims=True) * over[out, None]
+            pull = shares * self.free[self.corners[out]]
+            pull = pull / np.maximum((shares * pull).sum(axis=1, keepdims=True), _LEAST_SHARE) * over[out, None]
             total, count = np.zeros_like(skin), np.zeros(len(skin))
             np.add.at(total, self.corners[out], -(pull * shares)[..., None] * normal[out, None])
             np.add.at(count, self.corners[out], shares)
@@ -78,6 +81,6 @@ class MouthBag:
         found = Surface(skin, self.patch).closest(points)
         normal = interpolate(vertex_normals(skin, self.faces), self.patch, found.faces, found.barycentric)
         height = ((points - found.points) * normal).sum(axis=1)
-        # Past the rim of the lips no skin lies before the lining.
+        # Past its rim no such skin lies before the lining.
         beyond = (self._rim[self.patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
         return np.where(beyond, -np.inf, height), normal

@@ -133,7 +133,7 @@ class _Mouth:
         return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
 
     def with_single_shapes(self, targets, changed_from=None):
-        """Targets of which each by itself keeps the lips apart on its whole way; those as in changed_from are left."""
+        """Targets of which each by itself keeps the lips apart on its whole way; only those that changed_from lacks."""
         names = self._lip_shapes(targets)
         if changed_from is not None:
             names = [name for name in names if (targets.delta(name) != changed_from.delta(name)).any()]
