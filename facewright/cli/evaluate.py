@@ -101,12 +101,13 @@ def own_crossings(info):
     """Crossings that the template of a rig has on its own head; None where that template is not here."""
     from facewright.evaluate.shapes import crossings
     from facewright.pipeline import template_rig
-    from facewright.template.store import read_template
+    from facewright.template.store import list_templates, read_template
 
-    try:
-        template = read_template(info["template"])
-    except (InputError, KeyError):
+    # A file's word for a template is a name and never a path to be followed.
+    name = info.get("template")
+    if name not in list_templates():
         return None
+    template = read_template(name)
     same = template.info.get("topology_id") == info.get("topology_id")
     return crossings(template_rig(template)) if same else None
 
