@@ -105,7 +105,7 @@ def own_crossings(info):
 
     # A file's word for a template is a name and never a path to be followed.
     name = info.get("template")
-    if name not in list_templates():
+    if str(name) not in list_templates():
         return None
     template = read_template(name)
     same = template.info.get("topology_id") == info.get("topology_id")
