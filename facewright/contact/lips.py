@@ -42,7 +42,7 @@ class LipOptions:
 
     lip_mm: float = 12.0
     near_mm: float = 20.0
-    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 7
+    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 9
     reach_mm: float = 4.0
     touch_mm: float = 0.15
     gap_mm: float = 0.05
