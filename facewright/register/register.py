@@ -20,7 +20,7 @@ from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
 from facewright.register.pairs import eyes_closed, landmark_errors, landmark_pairs
 from facewright.register.skin import fit_skin, skin_rules, without_hair
-from facewright.scan.pose import is_coarse
+from facewright.scan.pose import face_edge_mm
 
 # One slight smile is all the expression that is looked for on open-eyed rest faces: frowns, presses and brows, tried on
 # heads with known truth, were mostly identity (lips 2.5 mm off with them, 1.1 without).
@@ -47,8 +47,10 @@ class RegisterOptions:
 # (w_bend, w_stretch, tau mm, reach mm) per level; tuned on heads with known truth (bench/registration_truth.py):
 # lower final stiffness gains distance and loses correspondence, so the last levels only take up the scan's detail.
 LEVELS = tuple((w, w / 2, 3.0, 10.0) for w in (45.0, 20.0, 10.0, 5.0))
-# Facets are no detail: a scan cut to 3,000 triangles lands 0.48 mm from the full one without the last level, 0.51 with.
 DETAIL = ((2.0, 0.5, 1.5, 4.0),)
+# Facets are no detail: a scan cut to 3,000 triangles (edges of 11 mm) lands 0.48 mm from the full one without the last
+# level, 0.51 with. A scan with edges of 4.6 mm needs it: its lip seam is 0.9 mm off without, 0.5 with.
+FACETS_MM = 8.0
 
 
 def register(scan, landmarks, template, options=None, placed=()):
@@ -71,7 +73,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
-    levels = LEVELS if is_coarse(scan.vertices, scan.faces) else LEVELS + DETAIL
+    levels = LEVELS if face_edge_mm(scan.vertices, scan.faces) > FACETS_MM else LEVELS + DETAIL
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
     interior, outer, led = _interior(template)
     skin = _unfolded(template, skin, faces, matches)

@@ -144,11 +144,11 @@ def wardrobe_of(scan):
     return [CLAY_LOOKS] if looks is None else [looks, CLAY_LOOKS]
 
 
-def is_coarse(vertices, faces):
-    """Whether a head's mesh has facets that one sees: vertices (n, 3) mm in about our frame, faces (m, 3)."""
+def face_edge_mm(vertices, faces):
+    """Median length of a head mesh's edges in the face, mm: vertices (n, 3) in about our frame, faces (m, 3)."""
     faces = faces[np.linalg.norm(vertices[faces[:, 0]], axis=1) < FACE_REACH_MM]
     edges = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)
-    return bool(len(edges) and np.median(edges) > COARSE_MM)
+    return float(np.median(edges)) if len(edges) else 0.0
 
 
 def _closer_looks(scan, vertices):
@@ -158,7 +158,7 @@ def _closer_looks(scan, vertices):
     triangles: landmarks 0.9 mm from the full scan's, 1.3 with the clay).
     """
     wardrobe = wardrobe_of(scan)
-    return wardrobe[:1] if is_coarse(vertices, scan.faces) else wardrobe
+    return wardrobe[:1] if face_edge_mm(vertices, scan.faces) > COARSE_MM else wardrobe
 
 
 def _stand_up(scan, subject, to_search, options):
