@@ -89,15 +89,15 @@ class LipContact:
         in_teeth = [np.linalg.norm(row.way_out(rest[self._guarded], vertices[at]), axis=1) for at, row in self.teeth]
         self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
 
-    def shut(self, motion, weights=None, acts=None):
+    def shut(self, motion, weights=None, acts=None, lifted=False):
         """(n, 3) correction of a motion so that no slit is open between the lips where the correction acts most.
 
         Arguments as of apart. Less than whole a slit opens as the motion does, but a pair's corrective acts as the
-        square of that: what shut it half way would be twice too much at the end.
+        square of that: what shut it half way would be twice too much at the end. lifted as in LipSlit.wishes.
         """
         weight = self._where_it_acts_most(weights, acts)
         skin = (self.V + motion(weight))[self.used]
-        return self._of_head(self.slit.shut(skin) / (acts(weight) if acts else weight))
+        return self._of_head(self.slit.shut(skin, lifted) / (acts(weight) if acts else weight))
 
     def _where_it_acts_most(self, weights, acts):
         return max(weights or self.options.weights, key=acts or (lambda weight: weight))
@@ -115,13 +115,15 @@ class LipContact:
         hold = np.zeros(len(self.used))
         most_weight = self._where_it_acts_most(weights, acts)
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
-        asked = list(poses)
-        for width in _LOCAL_MM if closed else self.options.smooth_mm:
+        asked, left = list(poses), {}
+        best, least = field, np.inf  # rounds may swing where lips and teeth both push
+        for width in (*(_LOCAL_MM if closed else self.options.smooth_mm), None):
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
             for weight in asked:
                 share = acts(weight) if acts else weight
                 skin = poses[weight][self.used] + share * field
                 wishes, heeded = self._wishes(skin, poses[weight])
+                left[weight] = max(np.linalg.norm(wishes, axis=1).max(initial=0.0), self.options.touch_mm)
                 if closed:
                     self._add_closing(skin, wishes, heeded)
                 if shut and weight == most_weight:
@@ -132,13 +134,15 @@ class LipContact:
                 hold = np.maximum(hold, heeded)
                 if more.any():
                     met.append(weight)
-            if met:
+            if max(left.values()) <= least:
+                best, least = field, max(left.values())
+            if met and width is not None:
                 field = self.spread(field + total, _PIN * hold, width)
             elif len(asked) == len(poses):
                 break
             # What was free stays unasked until the rest is free: most of a path never touches.
             asked = met or list(poses)
-        return self._of_head(field)
+        return self._of_head(best)
 
     def _of_head(self, field):
         """(n, 3) a field of the surroundings of the lips (k, 3) as one of the whole head."""

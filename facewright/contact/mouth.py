@@ -146,7 +146,7 @@ class _Mouth:
         """Targets of which left and right together keep the lips apart too; each side gets its share."""
         for name in self._lip_shapes(targets):
             twin = mirrored_name(name)
-            if name.startswith("mouth") and name.endswith("Left") and name != twin and twin in targets.names:
+            if name.startswith("mouth") and name.endswith("Left") and name != "mouthLeft" and twin in targets.names:
                 shares = {name: self.left, twin: 1.0 - self.left}
                 targets = self._corrected(targets, {name: 1.0, twin: 1.0}, shares)
         return targets
@@ -294,10 +294,10 @@ class _Mouth:
         def motion(weight):
             return targets.motion(_scaled(pose, weight)) + act(weight) * first
 
-        shut = _stays_shut(pose)
+        shut, twice = _stays_shut(pose)
         if shut:
-            first = first + self.contact.shut(motion, weights, acts)
-        return first + self.contact.apart(motion, weights, acts, closed, shut)
+            first = first + self.contact.shut(motion, weights, acts, lifted=twice)
+        return first + self.contact.apart(motion, weights, acts, closed, shut and not twice)
 
     def _too_much(self, targets, pose):
         """(n, 3) what a pose does twice: the ring of muscle around the mouth draws together only once."""
@@ -341,9 +341,10 @@ def _scaled(weights, by):
 
 
 def _stays_shut(pose):
-    """Whether lips that are shut stay so under a pose: dict shape -> weight."""
+    """Whether lips that are shut stay so under a pose (dict shape -> weight), and whether two shapes see to that."""
     names = {name if name in SHUT_SHAPES else name.removesuffix("Left").removesuffix("Right") for name in pose}
-    return names <= set(SHUT_SHAPES) or names in map(set, SHUT_PAIRS)
+    each = names <= set(SHUT_SHAPES)
+    return each or names in map(set, SHUT_PAIRS), each and len(names) > 1
 
 
 def _sides(name, names):

@@ -16,6 +16,7 @@ _PIN = 100.0  # weight of a wish against 1 mm2 of bending
 @dataclass(frozen=True)
 class ShutOptions:
     """overlap_mm by which one lip covers the other as seen from the front
+    lap_mm     by which lips that are drawn apart may go on covering each other
     touch_mm   a slit narrower than this is none
     inside_mm, outside_mm  behind and before the seam: lip that counts
     pitch_deg  a slit counts as seen from so far above and below the front
@@ -24,6 +25,7 @@ class ShutOptions:
     """
 
     overlap_mm: float = 0.05
+    lap_mm: float = 0.1
     touch_mm: float = 0.1
     inside_mm: float = 2.0
     outside_mm: float = 9.0
@@ -61,10 +63,7 @@ class LipSlit:
             over = [_Crossings(at, x, edges) for edges in self._edges]
             for height in self._heights:
                 y = skin @ height
-                low, high = (
-                    -over[0].highest(-y),
-                    over[1].highest(y),
-                )  # the upper lip's lower edge, the lower's upper one
+                low, high = -over[0].highest(-y), over[1].highest(y)  # edges of the upper lip and the lower one
                 gap = np.full(len(at), -np.inf)
                 both = np.isfinite(low) & np.isfinite(high)
                 gap[both] = low[both] - high[both]
@@ -72,21 +71,27 @@ class LipSlit:
             result.append(worst)
         return result
 
-    def wishes(self, skin):
-        """(n, 3) what shuts the slit of a pose (n, 3), half and half, and (n,) by how much it is open there, mm."""
+    def wishes(self, skin, lifted=False):
+        """(n, 3) what shuts the slit of a pose (n, 3), half and half, and (n,) by how much it is open there, mm.
+
+        lifted  lips that cover each other by more than lap_mm are also drawn apart so far
+        """
         move, over = np.zeros(len(skin)), np.zeros(len(skin))
         for line, gap, rest, sign in zip(self.seams, self.gaps(skin), self._at_rest, (-1.0, 1.0)):
             more = gap - rest
             wish = np.where(more > self.options.touch_mm, more + self.options.overlap_mm, 0.0)
-            move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, wish
+            if lifted:
+                lap = np.maximum(-self.options.lap_mm - more, 0.0)
+                wish = wish - np.where(np.isfinite(lap), lap, 0.0)
+            move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, np.abs(wish)
         return move[:, None] * [0.0, 1.0, 0.0], over
 
-    def shut(self, skin):
-        """(n, 3) correction that shuts the slit of a pose (n, 3)."""
+    def shut(self, skin, lifted=False):
+        """(n, 3) correction that shuts the slit of a pose (n, 3); lifted as in wishes."""
         field, hold = np.zeros_like(skin), np.zeros(len(skin))
         hold[np.concatenate(self.seams)] = 1.0
         for _ in range(self.options.rounds):
-            wishes, over = self.wishes(skin + field)
+            wishes, over = self.wishes(skin + field, lifted)
             if not over.any():
                 break
             field = field + self._spread(wishes, _PIN * hold, self.options.smooth_mm)
