@@ -19,29 +19,20 @@ from cases import find_benchmark_template, fingerprint
 from common import CACHE, SCANS, peak_memory_mb, print_table
 
 from facewright.cli.evaluate import print_rows
-from facewright.contact import part_lips
-from facewright.data import Face
 from facewright.evaluate.bars import rig_rows
 from facewright.evaluate.rows import Row, worst_rows
 from facewright.evaluate.shapes import MIRROR_BAR_MM, crossings, mirror_mm
 from facewright.evaluate.synthetic import random_identity
 from facewright.packing import pack_face, unpack_face
-from facewright.parts import fit_parts
-from facewright.pipeline import rig_from_face, template_rig
 from facewright.read import read_scan
 from facewright.register import register
+from facewright.rigging import in_place, rig_from_face, template_rig, unscanned_face
 from facewright.sample import sample_path
 from facewright.scan import clean_scan, find_landmarks
 from facewright.transfer import transfer_shapes
 
 TRANSFER_BAR_S, CONTACT_BAR_S = 1.5, 10.0
 REAL = {"lee-perry-smith": "lee-perry-smith/head.obj", "menpo-james": "menpo-james/james.obj"}
-
-
-def unregistered(template, vertices):
-    """A Face that no scan was needed for: vertices (n, 3) of a head in the template's topology, at rest."""
-    seen, closed = np.ones(len(vertices), bool), {"left": False, "right": False}
-    return Face(template, vertices, vertices, template.regions, template.lines, seen, {}, closed, {})
 
 
 def registered(template, path, fresh):
@@ -61,7 +52,7 @@ def registered(template, path, fresh):
 
 def rigged(face, seconds):
     """The Rig of a Face, as the main job makes it; adds core seconds (the clock's, when nothing else runs)."""
-    face = part_lips(fit_parts(face))
+    face = in_place(face)
     start = time.process_time()
     transfer_shapes(face)
     seconds["transfer"], start = time.process_time() - start, time.process_time()
@@ -78,9 +69,9 @@ def heads(template, count, only, fresh):
         if only and name not in only:
             continue
         if name == "template":
-            yield name, unregistered(template, template.vertices)
+            yield name, unscanned_face(template, template.vertices)
         elif name not in scans:
-            yield name, unregistered(template, random_identity(template, int(name[-2:])))
+            yield name, unscanned_face(template, random_identity(template, int(name[-2:])))
         elif scans[name].is_file():
             yield name, registered(template, scans[name], fresh)
 

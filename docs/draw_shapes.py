@@ -14,7 +14,7 @@ from render import jpeg_bytes
 
 from facewright.errors import InputError
 from facewright.mesh.raster import Camera
-from facewright.pipeline import template_rig
+from facewright.rigging import template_rig
 from facewright.template.store import read_template
 from facewright.write.close_ups import close_up_cameras, close_up_poses
 from facewright.write.files import replace_file

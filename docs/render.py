@@ -16,16 +16,15 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from facewright.bake import BakeOptions, bake
-from facewright.contact import part_lips
 from facewright.data import Face, Rig, Scan
 from facewright.mesh.normals import face_areas
 from facewright.mesh.polygons import polygon_edges
 from facewright.mesh.raster import Camera, RayScene
 from facewright.mesh.scene import Drawable, Scene
-from facewright.parts import find_irises, fit_parts
-from facewright.pipeline import rig_from_face
+from facewright.parts import find_irises
 from facewright.read import read_scan
 from facewright.register import register
+from facewright.rigging import in_place, rig_from_face
 from facewright.sample import sample_path
 from facewright.scan import clean_scan, find_landmarks
 from facewright.template.store import read_template
@@ -68,7 +67,7 @@ def rigged_sample(texture_size=2048):
     scan, _ = clean_scan(read_scan(sample_path()))
     found = find_landmarks(scan)
     face = register(found.scan, found.landmarks, read_template("hm08"))
-    face = part_lips(fit_parts(face, irises=find_irises(found.scan, face)))
+    face = in_place(face, find_irises(found.scan, face))
     maps = bake(found.scan, face, BakeOptions(size=texture_size))
     return Sample(found.scan, face, rig_from_face(face, maps), maps)
 

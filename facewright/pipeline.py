@@ -14,23 +14,22 @@ import numpy as np
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
 from facewright.cache import StageStore, file_digest, fingerprint
-from facewright.contact import Targets, find_jaw, hold_neck, lay_flat, lay_tongue, part_lips, solve_eyes, solve_mouth
+from facewright.contact import Targets
 from facewright.conventions import ARKIT_SHAPES
-from facewright.data import Face
 from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
 from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
-from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, build_rig, find_irises, fit_parts
+from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, find_irises
 from facewright.read import read_scan
 from facewright.read.images import check_image
 from facewright.read.named import named_files
 from facewright.read.scan import check_scan_file
 from facewright.register import RegisterOptions, register
+from facewright.rigging import assembled, in_place, shapes_of
 from facewright.scan import LandmarkOptions, clean_scan, find_landmarks, read_landmarks
 from facewright.scan.landmark_files import landmark_index
 from facewright.template.store import find_template, read_template
-from facewright.transfer import keep_within_amplitudes, keep_within_regions, ride_on_lids, transfer_shapes
 from facewright.write.credits import write_credits
 from facewright.write.files import PngOnce
 from facewright.write.gltf import write_gltf
@@ -254,30 +253,10 @@ def _register(run, scan, landmarks, placed, template, folder, options):
 
 def _parts(run, scan, face, template):
     def work():
-        return pack_face(part_lips(fit_parts(face, irises=find_irises(scan, face))))
+        return pack_face(in_place(face, find_irises(scan, face)))
 
     arrays, info = run.stage("04-parts", work)
     return unpack_face(arrays, info, template)
-
-
-def shapes_of(face, jobs=1):
-    """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
-    carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
-    skin = solve_mouth(face, solve_eyes(face, lay_tongue(face, carried)), jobs=jobs)
-    return _with_riders(face, lay_flat(face, skin))
-
-
-def rig_from_face(face, maps=None, jobs=1):
-    """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
-    return _assembled(face, shapes_of(face, jobs), maps)
-
-
-def template_rig(template, jobs=1):
-    """The data.Rig of a Template's own head, made as a person's is."""
-    seen, closed = np.ones(len(template.vertices), bool), {"left": False, "right": False}
-    V = template.vertices
-    face = Face(template, V, V, template.regions, template.lines, seen, {}, closed, {})
-    return rig_from_face(part_lips(fit_parts(face)), jobs=jobs)
 
 
 def _transfer(run, face, template, jobs, beside):
@@ -286,7 +265,7 @@ def _transfer(run, face, template, jobs, beside):
     def work():
         beside.begin()
         targets = shapes_of(face, jobs)
-        bare = _assembled(face, targets, options=AssemblyOptions(eyes=None, painted=False))
+        bare = assembled(face, targets, options=AssemblyOptions(eyes=None, painted=False))
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
         info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in targets.in_betweens.items()]
@@ -303,22 +282,6 @@ def _transfer(run, face, template, jobs, beside):
         {name: tuple(drivers) for name, drivers in info["correctives"]},
     )
     return targets, info["figures"]
-
-
-def _assembled(face, targets, maps=None, options=None):
-    """The Rig with the jaw's bone at the hinge that jawOpen turns about."""
-    rig = build_rig(face, targets.deltas, maps, options, targets)
-    jaw = find_jaw(face, targets.delta("jawOpen")) if "jawOpen" in targets.names else None
-    return rig if jaw is None else jaw.on_rig(rig)
-
-
-def _with_riders(face, shapes):
-    """The shapes with lashes and all else that rides on the lids as their final skin wants it."""
-    names = [*face.template.shape_names, *shapes.extras]
-    deltas = np.concatenate([shapes.deltas, *(delta[None] for delta in shapes.extras.values())])
-    deltas = ride_on_lids(face, deltas, names, shapes.correctives)
-    n = len(shapes.deltas)
-    return replace(shapes, deltas=deltas[:n], extras=dict(zip(shapes.extras, deltas[n:])))
 
 
 def _bake(run, options, baking):
@@ -339,7 +302,7 @@ def _write(run, path, scan, face, shapes, figures, maps, found, output, options)
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
-        rig = _assembled(face, shapes, maps, AssemblyOptions(eyes=EyeLook(pattern=options.iris)))
+        rig = assembled(face, shapes, maps, AssemblyOptions(eyes=EyeLook(pattern=options.iris)))
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
         earlier = run.store.last_info("07-write").get("files", {})
         with output.workshop() as folder, ThreadPoolExecutor(1) as beside:

@@ -100,7 +100,7 @@ def print_bars(path, blends, as_json):
 def own_crossings(info):
     """Crossings that the template of a rig has on its own head; None where that template is not here."""
     from facewright.evaluate.shapes import crossings
-    from facewright.pipeline import template_rig
+    from facewright.rigging import template_rig
     from facewright.template.store import list_templates, read_template
 
     # A file's word for a template is a name and never a path to be followed.
