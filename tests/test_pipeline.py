@@ -32,7 +32,7 @@ APPLE = (
     "mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight browDownLeft browDownRight browInnerUp browOuterUpLeft "
     "browOuterUpRight cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft noseSneerRight tongueOut"
 ).split()
-WORK = ("read_scan", "find_landmarks", "register", "fit_parts", "transfer_shapes", "bake", "write_results")
+WORK = ("read_scan", "find_landmarks", "register", "in_place", "shapes_of", "bake", "write_results")
 
 
 class Killed(BaseException):
@@ -160,7 +160,7 @@ def test_damaged_stages_are_worked_out_again(sample_job, copied, forbid, writes_
     arrays.write_bytes(bytes(content))
     (copied / "stages" / "06-bake" / "stage.json").write_text("{")
     (copied / "rig.glb").write_bytes(b"spoilt")
-    forbid(("read_scan", "find_landmarks", "register", "transfer_shapes"))
+    forbid(("read_scan", "find_landmarks", "register", "shapes_of"))
     report = rig_job(sample_path(), copied, sample_job.options)
     assert [stage for stage in STAGES if not report["reused"][stage]] == ["04-parts", "06-bake", "07-write"]
     assert arrays.read_bytes() == (sample_job.folder / "stages" / "04-parts" / "arrays.npz").read_bytes()
