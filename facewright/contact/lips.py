@@ -9,6 +9,7 @@ wishes add up over a few rounds and over all weights at once, so that one delta 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import igl
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from facewright.contact.shut import LipSlit
 from facewright.contact.teeth import Teeth
+from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import vertex_normals
@@ -48,6 +50,13 @@ class LipOptions:
     gap_mm: float = 0.05
     teeth_mm: float = 0.1
     weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
+
+
+class _Watches(NamedTuple):
+    """What is known of a pose: the lips in each other (two), in each row of teeth."""
+
+    lips: tuple[Watch, Watch]
+    teeth: tuple[Watch, ...]
 
 
 class LipContact:
@@ -86,8 +95,11 @@ class LipContact:
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
         self.teeth = [(at, Teeth(vertices[at], own)) for at, own in teeth]
-        in_teeth = [np.linalg.norm(row.way_out(rest[self._guarded], vertices[at]), axis=1) for at, row in self.teeth]
-        self._in_teeth = [np.minimum(depth, self.options.teeth_mm) for depth in in_teeth]
+        in_teeth = [row.way_out(rest[self._guarded], vertices[at])[0] for at, row in self.teeth]
+        self._in_teeth = [np.minimum(np.linalg.norm(way, axis=1), self.options.teeth_mm) for way in in_teeth]
+        lips = [Watch(rest[mine], rest[other]) for mine, other in zip(self.sides, self.sides[::-1])]
+        teeth = [Watch(rest[self._guarded], vertices[at]) for at, _ in self.teeth]
+        self._at_rest = self._wishes(rest, vertices, _Watches(tuple(lips), tuple(teeth)))[2]
 
     def shut(self, motion, weights=None, acts=None, lifted=False):
         """(n, 3) correction of a motion so that no slit is open between the lips where the correction acts most.
@@ -115,14 +127,16 @@ class LipContact:
         hold = np.zeros(len(self.used))
         most_weight = self._where_it_acts_most(weights, acts)
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
-        asked, left = list(poses), {}
+        asked, left, watches, last = list(poses), {}, {}, self._at_rest
         best, least = field, np.inf  # rounds may swing where lips and teeth both push
         for width in (*(_LOCAL_MM if closed else self.options.smooth_mm), None):
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
             for weight in asked:
                 share = acts(weight) if acts else weight
                 skin = poses[weight][self.used] + share * field
-                wishes, heeded = self._wishes(skin, poses[weight])
+                last = watches.get(weight, last)
+                wishes, heeded, last = self._wishes(skin, poses[weight], last)
+                watches[weight] = last
                 left[weight] = max(np.linalg.norm(wishes, axis=1).max(initial=0.0), self.options.touch_mm)
                 if closed:
                     self._add_closing(skin, wishes, heeded)
@@ -151,18 +165,21 @@ class LipContact:
         result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
         return result
 
-    def _wishes(self, skin, pose):
+    def _wishes(self, skin, pose, watches):
         """Wishes (k, 3) that undo the contact of the skin around the lips (k, 3), teeth in a pose (n, 3) of the head,
-        and (k,) in 0..1 who wishes."""
+        (k,) in 0..1 who wishes, and the _Watches for the next pose; watches: those of an earlier one."""
         skin = np.ascontiguousarray(skin)
-        wishes, counts = self._lip_wishes(skin)
-        for (at, row), allowed in zip(self.teeth, self._in_teeth):
-            way = row.way_out(skin[self._guarded], pose[at])
-            depth = np.linalg.norm(way, axis=1)
+        wishes, counts, lips = self._lip_wishes(skin, watches.lips)
+        guarded, teeth = skin[self._guarded], []
+        for (at, row), allowed, watch in zip(self.teeth, self._in_teeth, watches.teeth):
+            due = watch.due(guarded, pose[at])
+            way, clearance = row.way_out(guarded[due], pose[at])
+            teeth.append(watch.seen(guarded, pose[at], due, clearance))
+            depth, allowed = np.linalg.norm(way, axis=1), allowed[due]
             hit = depth > allowed + self.options.touch_mm
-            wishes[self._guarded[hit]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
-            counts[self._guarded[hit]] = 1.0
-        return wishes, np.minimum(counts, 1.0)
+            wishes[self._guarded[due[hit]]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            counts[self._guarded[due[hit]]] = 1.0
+        return wishes, np.minimum(counts, 1.0), _Watches(lips, tuple(teeth))
 
     def _add_closing(self, skin, wishes, counts):
         """Add, in place, what brings pairs of the seam that have come apart back to a small gap, half and half."""
@@ -180,37 +197,60 @@ class LipContact:
         more = (over > 0.0) & (counts == 0.0)
         wishes[more], counts[more] = lift[more], 1.0
 
-    def _lip_wishes(self, skin):
+    def _lip_wishes(self, skin, watches):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
         normals = vertex_normals(skin, self.faces)
-        suspects = [self._suspects(skin, normals, side) for side in (0, 1)]
-        index, corners, share, way = (np.concatenate(both) for both in zip(*suspects))
+        flesh = _Flesh(skin, self.faces, skin + _ASIDE_MM * normals, self._beyond)
+        *both, watches = zip(*(self._entered(skin, normals, flesh, side, watch) for side, watch in enumerate(watches)))
+        index, corners, share, way = map(np.concatenate, both)
         wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
-        if not len(index):
-            return wishes, counts
-        asked = skin[index] + _ASIDE_MM * normals[index]
-        inside = _winding(skin, self.faces, asked) + self._beyond[index] > 0.5
-        index, corners, share, way = (values[inside] for values in (index, corners, share, way))
         at = np.concatenate([index[:, None], corners], axis=1).ravel()
         weight = np.concatenate([np.ones((len(index), 1)), share], axis=1).ravel()
         push = np.repeat(0.5 * way, 4, axis=0) * weight[:, None]
         push.reshape(-1, 4, 3)[:, 1:] *= -1
         np.add.at(wishes, at, push)
         np.add.at(counts, at, weight)
-        return wishes / np.maximum(counts, 1.0)[:, None], counts
+        return wishes / np.maximum(counts, 1.0)[:, None], counts, watches
 
-    def _suspects(self, skin, normals, side):
-        """Vertices (k,) of a lip that lie behind the other one's surface: with the corners (k, 3) of the triangle they
-        have passed, their shares of it (k, 3) and the way out (k, 3)."""
+    def _entered(self, skin, normals, flesh, side, watch):
+        """Vertices (k,) of a lip that lie in the other one, with the corners (k, 3) of the triangle they have passed,
+        their shares of it (k, 3) and the way out (k, 3); and the Watch for the next pose."""
         mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
-        found = Surface(skin, patch).closest(skin[mine])
+        points, other = skin[mine], skin[self.sides[1 - side]]
+        due = watch.due(points, other)
+        if not len(due):
+            none = np.zeros((0, 3))
+            return due, none.astype(int), none, none, watch.seen(points, other, due, 0.0)
+        found = Surface(skin, patch).closest(points[due])
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
-        way = found.points - skin[mine]
-        depth = found.distance
-        maybe = ((way * normal).sum(axis=1) > 0) & (depth > self.options.touch_mm) & (depth < _MOST_MM)
+        way, depth = found.points - points[due], found.distance
+        behind = (way * normal).sum(axis=1) > 0
+        maybe = behind & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
-        return mine[maybe], corners[maybe], found.barycentric[maybe], (way + self.options.gap_mm * normal)[maybe]
+        inside = np.flatnonzero(maybe)
+        inside = inside[flesh.holds(mine[due[inside]])]
+        watch = watch.seen(points, other, due, np.where(behind, 0.0, depth))
+        out = way + self.options.gap_mm * normal
+        return mine[due[inside]], corners[inside], found.barycentric[inside], out[inside], watch
+
+
+class _Flesh:
+    """Where flesh is: points (n, 3) asked for the vertices of a patch, and what the rest of the head adds (n,)."""
+
+    def __init__(self, vertices, faces, asked, beyond):
+        self._patch, self._asked, self._beyond = (vertices, faces), asked, beyond
+        self._tree = None
+
+    def holds(self, index):
+        """(k,) bool for vertices (k,); the tree is built for the first that asks."""
+        if not len(index):
+            return np.zeros(0, bool)
+        if self._tree is None:
+            self._tree = igl.FastWindingNumberBVH()
+            self._tree.init(*self._patch)
+        number = np.asarray(self._tree.winding_number(np.ascontiguousarray(self._asked[index]))).reshape(-1)
+        return number + self._beyond[index] > 0.5
 
 
 def _winding(vertices, faces, points):

@@ -51,7 +51,7 @@ class LipSlit:
         pitch = np.radians(self.options.pitch_deg)
         self._heights = [np.array([0.0, np.cos(pitch), turn * np.sin(pitch)]) for turn in (-1.0, 1.0)]
         self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
-        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm)
+        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm, asking=seam)
         self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]
 
     def gaps(self, skin):

@@ -26,30 +26,43 @@ class Teeth:
         self._low, self._high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         outer = self.faces[_outer_side(self.vertices, self.faces)]
         self._outside, self._normals = Surface(self.vertices, outer), face_normals(self.vertices, outer)
+        self._surface = Surface(self.vertices, self.faces)
+        self._surface_normals = face_normals(self.vertices, self.faces)
         self._tree = igl.FastWindingNumberBVH()
         self._tree.init(self.vertices, self.faces)
         self._to_affine = np.linalg.pinv(np.column_stack([self.vertices, np.ones(len(vertices))]))
         self.solid = self._is_solid()
 
     def way_out(self, points, moved):
-        """(k, 3) ways out of the teeth for points (k, 3), zero outside; moved (v, 3): the row in its pose."""
-        result = np.zeros_like(points)
+        """Ways out of the teeth (k, 3) for points (k, 3), zero outside, and (k,) clearances.
+
+        moved (v, 3): the row in its pose; a clearance is how far a point may move before it can be in a tooth
+        """
+        result, clearance = np.zeros_like(points), np.full(len(points), np.inf)
         if not self.solid:
-            return result
+            return result, clearance
         affine = self._to_affine @ moved
         A, t = affine[:3].T, affine[3]
         back = np.linalg.solve(A, (points - t).T).T
-        near = np.flatnonzero(((back > self._low) & (back < self._high)).all(axis=1))
-        if not len(near):
-            return result
-        # Most points lie before the outer side: only the rest need the dear question.
-        found = self._outside.closest(back[near])
-        way = found.points - back[near]
-        maybe = ((way * self._normals[found.faces]).sum(axis=1) > 0) & (found.distance < _MOST_MM)
-        inside = np.flatnonzero(maybe)
-        inside = inside[self._winding(back[near[inside]]) > 0.5]
-        result[near[inside]] = way[inside] @ A.T
-        return result
+        clearance = np.linalg.norm(np.maximum(np.maximum(self._low - back, back - self._high), 0.0), axis=1)
+        near = np.flatnonzero(clearance == 0.0)
+        if len(near):
+            # Most points lie before the outer side: only the rest need the dear question.
+            found = self._outside.closest(back[near])
+            way = found.points - back[near]
+            behind = (way * self._normals[found.faces]).sum(axis=1) > 0
+            inside = np.flatnonzero(behind & (found.distance < _MOST_MM))
+            inside = inside[self._winding(back[near[inside]]) > 0.5]
+            result[near[inside]] = way[inside] @ A.T
+            clearance[near] = self._clear_of_all(back[near])
+            clearance[near[inside]] = 0.0
+        return result, clearance * np.linalg.svd(A, compute_uv=False)[-1]
+
+    def _clear_of_all(self, points):
+        """(k,) distance of points (k, 3) to the row, 0 for those behind its nearest face."""
+        found = self._surface.closest(points)
+        before = ((found.points - points) * self._surface_normals[found.faces]).sum(axis=1) <= 0
+        return np.where(before, found.distance, 0.0)
 
     def _winding(self, points):
         if not len(points):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve
 
 from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass
 from facewright.solve.quadratic import Factorization
@@ -50,26 +51,40 @@ class SmoothSpread:
 
 
 class SoftSpread:
-    """Displacements of least bending that follow wishes of some vertices, factored anew for each set of wishes.
+    """Displacements of least bending that follow wishes of some vertices.
 
-    Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free.
+    Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free. What a push at
+    one vertex does to all others is solved once; wishes of k vertices then cost a dense system of k.
     V (n, 3), F (m, 3), free (n,) bool; reach_mm: the field fades over this distance
+    asking  indices of the vertices that may wish for something; default: all that are free
     """
 
-    def __init__(self, V, F, free, reach_mm=5.0):
-        self.free, self._n = np.flatnonzero(free), len(V)
-        self._energy = _bending(V, F, reach_mm)[self.free][:, self.free]
+    def __init__(self, V, F, free, reach_mm=5.0, asking=None):
+        self._free, self._n = np.flatnonzero(free), len(V)
+        asking = self._free if asking is None else np.intersect1d(asking, self._free)
+        self._row = np.full(self._n, -1)
+        self._row[asking] = np.arange(len(asking))
+        self._column = np.searchsorted(self._free, asking)
+        pushes = np.zeros((len(self._free), len(asking)))
+        pushes[self._column, np.arange(len(asking))] = 1.0
+        energy = _bending(V, F, reach_mm)[self._free][:, self._free]
+        self._response = np.ascontiguousarray(Factorization(energy).solve(pushes).T)
 
     def __call__(self, wishes, weights, smooth_mm=1.0):
         """(n, 3) field for wishes (n, 3) with weights (n,); a vertex of weight 0 wishes for nothing.
 
         smooth_mm  width over which one vertex with w = 1 mm^2 is felt
         """
-        w = weights[self.free]
         field = np.zeros((self._n, 3))
-        field[self.free] = Factorization(smooth_mm**4 * self._energy + sp.diags(w)).solve(
-            w[:, None] * wishes[self.free]
-        )
+        who = np.flatnonzero((weights > 0) & (self._row >= 0))
+        if not len(who):
+            return field
+        rows = self._row[who]
+        response = self._response[rows]
+        system = response[:, self._column[rows]]
+        system[np.diag_indices(len(who))] += smooth_mm**4 / weights[who]
+        factor = cho_factor(system, check_finite=False)
+        field[self._free] = response.T @ cho_solve(factor, wishes[who], check_finite=False)
         return field
 
 

@@ -35,7 +35,7 @@ def row():
 
 def test_inside_leaves_forwards_even_when_the_back_is_nearer(row):
     points = np.array([[0.0, 0.0, 21.0], [0.0, 0.0, 27.0], [0.0, 0.0, 15.0]])
-    way = row.way_out(points, row.vertices)
+    way, _ = row.way_out(points, row.vertices)
     assert np.allclose(way[0], [0, 0, 5], atol=0.1)
     assert not way[1:].any()
 
@@ -45,8 +45,8 @@ def test_a_turned_row_answers_the_same(row):
     R = best_rotation(*rng.normal(size=(2, 6, 3)))
     points = rng.uniform([-25, -4, 0], [25, 4, 26], (200, 3))
     shift = np.array([3.0, -40.0, 7.0])
-    way = row.way_out(points, row.vertices)
-    turned = row.way_out(points @ R.T + shift, row.vertices @ R.T + shift)
+    way, _ = row.way_out(points, row.vertices)
+    turned, _ = row.way_out(points @ R.T + shift, row.vertices @ R.T + shift)
     assert way.any() and np.abs(turned - way @ R.T).max() < 1e-9
 
 
@@ -55,4 +55,15 @@ def test_a_strip_is_no_solid():
     n = len(V) // 4
     front = F[(2 * n > F).all(axis=1)]
     strip = Teeth(V[: 2 * n], front)
-    assert not strip.solid and not strip.way_out(np.array([[0.0, 0.0, 21.0]]), strip.vertices).any()
+    assert not strip.solid and not strip.way_out(np.array([[0.0, 0.0, 21.0]]), strip.vertices)[0].any()
+
+
+def test_who_moves_less_than_its_clearance_stays_out(row):
+    rng = np.random.default_rng(1)
+    points = rng.uniform([-30, -6, -4], [30, 6, 30], (2000, 3))
+    way, clearance = row.way_out(points, row.vertices)
+    assert not clearance[way.any(axis=1)].any() and (clearance > 1.0).any()
+    step = rng.normal(size=points.shape)
+    step *= 0.999 * (clearance / np.linalg.norm(step, axis=1))[:, None]
+    outside = ~way.any(axis=1)
+    assert not row.way_out((points + step)[outside], row.vertices)[0].any()
