@@ -53,8 +53,8 @@ class SmoothSpread:
 class SoftSpread:
     """Displacements of least bending that follow wishes of some vertices.
 
-    Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free. What a push at
-    one vertex does to all others is solved once; wishes of k vertices then cost a dense system of k.
+    Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free.
+    What a push at one vertex does to all others is solved once; wishes of k vertices then cost a dense system of k.
     V (n, 3), F (m, 3), free (n,) bool; reach_mm: the field fades over this distance
     asking  indices of the vertices that may wish for something; default: all that are free
     """
