@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
@@ -184,7 +185,10 @@ def rig_job(path, out, options=None, progress=None):
     store.sweep()
     run = _Run(store, progress, rerun_from)
     try:
-        return _run_job(run, Path(path), output, options, inputs, placed, template, folder)
+        # Threads share the work by shapes and pictures. Those of BLAS would only wait for each other: its matrices are
+        # small, and the job took twice the core seconds with them.
+        with threadpool_limits(1, user_api="blas"):
+            return _run_job(run, Path(path), output, options, inputs, placed, template, folder)
     except InputError:
         output.remove_what_is_new()
         raise

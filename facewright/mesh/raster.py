@@ -66,12 +66,19 @@ class Camera:
 
     half_height  half of the visible height, mm
     size         (height, width) in pixels
+    window       (top, bottom, left, right): the rows and columns of the picture that are looked at; default: all
     """
 
     R: np.ndarray
     center: np.ndarray
     half_height: float
     size: tuple[int, int]
+    window: tuple[int, int, int, int] | None = None
+
+    @property
+    def looked_at(self):
+        """(top, bottom, left, right) rows and columns of the picture that are looked at."""
+        return self.window or (0, self.size[0], 0, self.size[1])
 
     @staticmethod
     def looking_at(center, yaw_deg=0.0, pitch_deg=0.0, half_height=140.0, size=(640, 640)):
@@ -83,23 +90,25 @@ class Camera:
         return Camera(np.stack([right, up, backward]), np.asarray(center, float), float(half_height), tuple(size))
 
     def rays(self):
-        """origins, directions (h*w, 3), row by row from the top left."""
+        """origins, directions (h*w, 3) of what is looked at, row by row from the top left."""
         height, width = self.size
+        top, bottom, left, right = self.looked_at
         scale = 2 * self.half_height / height
-        x = (np.arange(width) - width / 2 + 0.5) * scale
-        y = -(np.arange(height) - height / 2 + 0.5) * scale
+        x = (np.arange(left, right) - width / 2 + 0.5) * scale
+        y = -(np.arange(top, bottom) - height / 2 + 0.5) * scale
         grid_x, grid_y = np.meshgrid(x, y)
         offsets = grid_x.reshape(-1, 1) * self.R[0] + grid_y.reshape(-1, 1) * self.R[1]
         origins = self.center + offsets + 1000.0 * self.R[2]
         return origins, np.broadcast_to(-self.R[2], origins.shape)
 
     def in_picture(self, vertices, faces):
-        """Indices of faces (m, 3) whose outline on the picture's plane comes into the picture."""
+        """Indices of faces (m, 3) whose outline on the picture's plane comes into what is looked at."""
         pixels = self.project(vertices)[0].T  # (2, n)
         corners = pixels[:, faces.T]  # (2, 3, m)
         least, most = corners.min(axis=1), corners.max(axis=1)
-        height, width = self.size
-        return np.flatnonzero((most >= 0.0).all(axis=0) & (least[0] <= width) & (least[1] <= height))
+        top, bottom, left, right = self.looked_at
+        beyond = (most[0] < left) | (most[1] < top) | (least[0] > right) | (least[1] > bottom)
+        return np.flatnonzero(~beyond)
 
     def project(self, points):
         """(k, 3) mm -> (k, 2) pixels (x right, y down) and (k,) height towards the viewer."""

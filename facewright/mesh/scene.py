@@ -94,11 +94,12 @@ class Scene:
         self._frames = [looks.frames(now, normal) for looks, now, normal in zip(self._looks, vertices, normals)]
 
     def render(self, camera, *, unlit=False, background=BACKGROUND):
-        """A picture (h, w, 3) uint8 sRGB."""
-        height, width = camera.size
+        """A picture (h, w, 3) uint8 sRGB of what the camera looks at."""
+        top, bottom, left, right = camera.looked_at
         origins, directions = camera.rays()
-        pixel = 2 * camera.half_height / height
-        image = self._trace(origins, directions, camera, pixel, unlit, background).reshape(height, width, 3)
+        pixel = 2 * camera.half_height / camera.size[0]
+        image = self._trace(origins, directions, camera, pixel, unlit, background)
+        image = image.reshape(bottom - top, right - left, 3)
         edges = np.flatnonzero(_edges(image))
         if len(edges):
             corners = pixel / 4 * np.array([(-1, 1), (1, 1), (-1, -1), (1, -1)]) @ camera.R[:2]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from dataclasses import replace
+
 import numpy as np
 
 from facewright.evaluate.play import Player
@@ -22,15 +25,64 @@ class Puppet:
         self._rig, self._textured, self._meshes = rig, textured, shown_meshes(rig, textured)
         self._players = {full: Player(rig, full) for full in (True, False)}
         self.scene = Scene(rig_drawables(rig, textured))
+        self._rest = [mesh.vertices for mesh in self._meshes], self._shades([mesh.vertices for mesh in self._meshes])
+        self._stills, self._drawing = {}, threading.Lock()
 
     def posed(self, weights, camera, full=True):
         """The Scene under dict shape -> weight, for one camera; full: with in-betweens and correctives."""
         vertices = self._players[full].meshes(self._meshes, weights)
-        return self.scene.posed(vertices, camera, None if self._textured else mouth_shades(self._rig, vertices))
+        return self.scene.posed(vertices, camera, self._shades(vertices))
 
     def picture(self, weights, camera, full=True):
-        """(h, w, 3) uint8 of a pose on the ground of a contact sheet."""
-        return picture(self.posed(weights, camera, full), camera)
+        """(h, w, 3) uint8 of a pose on the ground of a contact sheet.
+
+        What the pose leaves alone is taken from the neutral's picture, which changes no pixel.
+        """
+        vertices = self._players[full].meshes(self._meshes, weights)
+        shades = self._shades(vertices)
+        image, window = np.array(self._still(camera)), self._touched(vertices, shades, camera)
+        if window is not None:
+            top, bottom, left, right = window
+            # Whether a pixel lies on an edge is seen beside its neighbours: one more on each side.
+            above, before = min(top, 1), min(left, 1)
+            height, width = camera.size
+            around = (top - above, min(bottom + 1, height), left - before, min(right + 1, width))
+            closer = replace(camera, window=around)
+            drawn = picture(self.scene.posed(vertices, closer, shades), closer)
+            image[top:bottom, left:right] = drawn[above:, before:][: bottom - top, : right - left]
+        return image
+
+    def _shades(self, vertices):
+        return [None] * len(vertices) if self._textured else mouth_shades(self._rig, vertices)
+
+    def _still(self, camera):
+        """The picture of the neutral, drawn once for a camera."""
+        key = (camera.R.tobytes(), camera.center.tobytes(), camera.half_height, camera.size)
+        with self._drawing:
+            if key not in self._stills:
+                self._stills[key] = picture(self.scene.posed(self._rest[0], camera, self._rest[1]), camera)
+            return self._stills[key]
+
+    def _touched(self, vertices, shades, camera):
+        """(top, bottom, left, right) of the pixels that may differ from the neutral's; None if there are none."""
+        corners = []
+        for mesh, now, shade, rest, lit in zip(self._meshes, vertices, shades, *self._rest):
+            if now is rest and shade is lit:
+                continue
+            touched = (now != rest).any(axis=1)
+            if shade is not None:
+                touched |= shade != lit
+            for _ in range(2):  # a vertex turns the normals of its neighbours, which light the faces around them
+                touched[mesh.faces[touched[mesh.faces].any(axis=1)]] = True
+            corners += [rest[touched], now[touched]]
+        corners = np.concatenate(corners) if corners else np.zeros((0, 3))
+        if not len(corners):
+            return None
+        pixels = camera.project(corners)[0]
+        height, width = camera.size
+        first = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, (width, height)).astype(int)
+        last = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, (width, height)).astype(int)
+        return (first[1], last[1], first[0], last[0]) if (first < last).all() else None
 
 
 def picture(scene, camera):
