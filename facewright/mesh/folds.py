@@ -20,8 +20,10 @@ def folded_by_shape(neutral, moved, faces, mask=None):
     neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
     fitted to the corners of all faces that share a vertex with it (Kabsch). Only faces that turn at all are asked.
     """
-    turned = (face_normals(neutral, faces) * face_normals(moved, faces)).sum(axis=1) < _HARDLY_TURNED
-    asked = np.flatnonzero(turned if mask is None else turned & mask)
+    stirred = (moved != neutral).any(axis=1)[faces].any(axis=1)
+    asked = np.flatnonzero(stirred if mask is None else stirred & mask)
+    turned = (face_normals(neutral, faces[asked]) * face_normals(moved, faces[asked])).sum(axis=1) < _HARDLY_TURNED
+    asked = asked[turned]
     if not len(asked):
         return asked
     expected = _expected_normals(neutral, moved, faces, asked)
