@@ -18,7 +18,7 @@ class ShutOptions:
     """overlap_mm by which one lip covers the other as seen from the front
     lap_mm     by which lips that are drawn apart may go on covering each other
     touch_mm   a slit narrower than this is none
-    inside_mm, outside_mm  behind and before the seam: lip that counts
+    inside_mm, outside_mm  behind and before the seam: lip that counts; lining seen before the line is a slit
     pitch_deg  a slit counts as seen from so far above and below the front
     smooth_mm  width over which a wish is felt; reach_mm over which it fades
     rounds     of wishes
@@ -27,7 +27,7 @@ class ShutOptions:
     overlap_mm: float = 0.05
     lap_mm: float = 0.1
     touch_mm: float = 0.1
-    inside_mm: float = 2.0
+    inside_mm: float = 0.5
     outside_mm: float = 9.0
     pitch_deg: float = 4.0
     smooth_mm: float = 4.0
