@@ -72,9 +72,10 @@ class MouthOptions:
 
 def part_lips(face, options=None):
     """The Face with a neutral whose lips neither cross nor stand in the teeth (its parts are in place)."""
-    contact = _Mouth(face, options or MouthOptions()).contact
+    mouth = _Mouth(face, options or MouthOptions())
     still = np.zeros_like(face.vertices)
-    return replace(face, vertices=face.vertices + contact.apart(lambda weight: still, (1.0,), closed=True))
+    clear = mouth.contact.apart(lambda weight: still, (1.0,), closed=True)
+    return replace(face, vertices=face.vertices + clear + mouth.contact.lifted(clear, mouth.forward))
 
 
 def solve_mouth(face, targets, options=None, jobs=1):
