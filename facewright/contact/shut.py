@@ -85,7 +85,7 @@ class LipSlit:
             more = gap - rest
             wish = np.where(more > self.options.touch_mm, more + self.options.overlap_mm, 0.0)
             if lifted:
-                lap = np.maximum(-self.options.lap_mm - more, 0.0)
+                lap = np.maximum(-self.options.lap_mm - gap, 0.0)
                 wish = wish - np.where(np.isfinite(lap), lap, 0.0)
             move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, np.abs(wish)
         return move[:, None] * [0.0, 1.0, 0.0], over
