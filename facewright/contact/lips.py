@@ -40,6 +40,7 @@ class LipOptions:
     gap_mm   between lips that have been pushed apart; rest_mm between their lines at rest, at least
     touch_mm contact less deep than this is none
     teeth_mm how deep in a tooth skin may stay that is there at rest
+    off_mm   how far before the teeth skin lies that was pushed out: their edges would stand out between its vertices
     weights  of a shape at which its contact is solved
     """
 
@@ -51,6 +52,7 @@ class LipOptions:
     gap_mm: float = 0.05
     rest_mm: float = 0.1
     teeth_mm: float = 0.1
+    off_mm: float = 0.3
     weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
 
 
@@ -196,7 +198,8 @@ class LipContact:
             teeth.append(watch.seen(guarded, pose[at], due, clearance))
             depth, allowed = np.linalg.norm(way, axis=1), allowed[due]
             hit = depth > allowed + self.options.touch_mm
-            wishes[self._guarded[due[hit]]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            farther = (depth - allowed)[hit] + self.options.off_mm
+            wishes[self._guarded[due[hit]]] = way[hit] * (farther / depth[hit])[:, None]
             counts[self._guarded[due[hit]]] = 1.0
         return wishes, np.minimum(counts, 1.0), _Watches(lips, tuple(teeth))
 
