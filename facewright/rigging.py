@@ -10,7 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from facewright.contact import find_jaw, hold_neck, keep_jaw_within, lay_flat, lay_tongue, part_lips, solve_eyes, solve_mouth
+from facewright.contact import (
+    find_jaw,
+    hold_neck,
+    keep_jaw_within,
+    lay_flat,
+    lay_tongue,
+    part_lips,
+    solve_eyes,
+    solve_mouth,
+)
 from facewright.data import Face
 from facewright.parts import build_rig, fit_parts
 from facewright.transfer import keep_within_amplitudes, keep_within_regions, ride_on_lids, transfer_shapes
