@@ -10,7 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from facewright.contact import find_jaw, hold_neck, lay_flat, lay_tongue, part_lips, solve_eyes, solve_mouth
+from facewright.contact import (
+    find_jaw,
+    hold_neck,
+    keep_jaw_within,
+    lay_flat,
+    lay_tongue,
+    part_lips,
+    solve_eyes,
+    solve_mouth,
+)
 from facewright.data import Face
 from facewright.parts import build_rig, fit_parts
 from facewright.transfer import keep_within_amplitudes, keep_within_regions, ride_on_lids, transfer_shapes
@@ -19,7 +28,8 @@ from facewright.transfer import keep_within_amplitudes, keep_within_regions, rid
 def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
     carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
-    skin = solve_mouth(face, solve_eyes(face, lay_tongue(face, carried)), jobs=jobs)
+    carried = lay_tongue(face, keep_jaw_within(face, carried))
+    skin = solve_mouth(face, solve_eyes(face, carried), jobs=jobs)
     return _with_riders(face, lay_flat(face, skin))
 
 

@@ -2,7 +2,7 @@
 
 from facewright.contact.eyes import EyeShapeOptions, solve_eyes
 from facewright.contact.folds import lay_flat
-from facewright.contact.jaw import find_jaw
+from facewright.contact.jaw import find_jaw, keep_jaw_within
 from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
 from facewright.contact.neck import hold_neck
 from facewright.contact.targets import Targets
@@ -15,6 +15,7 @@ __all__ = [
     "TongueOptions",
     "find_jaw",
     "hold_neck",
+    "keep_jaw_within",
     "lay_flat",
     "lay_tongue",
     "part_lips",

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from facewright.solve.procrustes import best_rotation
+from facewright.transfer.within import MARGIN, scale_of
+from facewright.working_set import read_working_set
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Jaw:
         return self.hinge + (points - self.hinge) @ R.T + share * self.slide
 
     def half_open(self, vertices, jaw_open, half=0.5):
-        """(n, 3) the in-between of jawOpen (n, 3): on the arc where the bone leads, on the chord for what is added."""
+        """(n, 3) jawOpen (n, 3) opened by a share: on the arc where the bone leads, on the chord for what is added."""
         by_bone = [self.weights[:, None] * (self.moved(vertices, share) - vertices) for share in (half, 1.0)]
         return by_bone[0] + half * (jaw_open - by_bone[1])
 
@@ -60,3 +62,22 @@ def find_jaw(face, jaw_open):
     hinge = hinge + ((rest.mean(axis=0) - hinge) @ axis) * axis
     weights = template.skin_weights[:, template.skeleton.names.index("jaw")]
     return Jaw(hinge, turn, slide, weights)
+
+
+def keep_jaw_within(face, deltas):
+    """Shapes (s, n, 3) mm of a data.Face whose jawOpen opens no farther than the working set says, along its arc.
+
+    A long face carries its chin far when its jaw turns as the template's does. Unchanged without a jaw
+    """
+    names = face.template.shape_names
+    if "jawOpen" not in names:
+        return deltas
+    number = names.index("jawOpen")
+    jaw = find_jaw(face, deltas[number])
+    most = read_working_set().words["jawOpen"].amplitude[1]
+    opens = np.linalg.norm(deltas[number, face.regions["outer"]], axis=1).max() * scale_of(face)
+    if jaw is None or opens <= most:
+        return deltas
+    result = np.array(deltas)
+    result[number] = jaw.half_open(face.vertices, deltas[number], (1.0 - MARGIN) * most / opens)
+    return result

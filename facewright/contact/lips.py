@@ -20,7 +20,7 @@ from facewright.contact.teeth import Teeth
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
-from facewright.mesh.normals import vertex_normals
+from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.spread import SoftSpread
 
@@ -29,6 +29,7 @@ _MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
 _PIN = 100.0  # weight of a push against 1 mm2 of bending
 _NOTHING_MM = 1e-4
 _LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
+_LEAST_SLOPE = 0.1  # of the lips' lines towards each other at a corner: there they are as near as they are to it
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,10 @@ class LipOptions:
     """lip_mm   along the skin from the seam, outwards and inwards: what counts as lip
     near_mm  skin this far from the seam may give way, and says where flesh is
     smooth_mm width over which a push is felt, round by round: deep contact moves a lip as a whole, the rest is local
-    gap_mm   between lips that have been pushed apart
+    gap_mm   between lips that have been pushed apart; rest_mm between their lines at rest, at least
     touch_mm contact less deep than this is none
     teeth_mm how deep in a tooth skin may stay that is there at rest
+    off_mm   how far before the teeth skin lies that was pushed out: their edges would stand out between its vertices
     weights  of a shape at which its contact is solved
     """
 
@@ -48,7 +50,9 @@ class LipOptions:
     reach_mm: float = 4.0
     touch_mm: float = 0.15
     gap_mm: float = 0.05
+    rest_mm: float = 0.1
     teeth_mm: float = 0.1
+    off_mm: float = 0.3
     weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
 
 
@@ -83,7 +87,7 @@ class LipContact:
         place = np.full(len(vertices), -1)
         place[self.used] = np.arange(len(self.used))
         lines = [place[line] for line in seams]
-        self._pairs = [line[1:-1] for line in lines]
+        self._pairs, self._ends = [line[1:-1] for line in lines], lines[0][[0, -1]]
         self._both = np.concatenate(self.sides)
         self.lips = self.used[self._both]
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
@@ -158,6 +162,23 @@ class LipContact:
             asked = met or list(poses)
         return self._of_head(best)
 
+    def lifted(self, motion, forward):
+        """(n, 3) correction of a motion (n, 3) that leaves rest_mm between the lines of lips that touch.
+
+        forward  (3,) unit, where the face looks: across it and the line one lip lies over the other
+        """
+        a, b = self._pairs
+        skin = (self.V + motion)[self.used]
+        middle = 0.5 * (skin[a] + skin[b])
+        up = normalized(np.cross(forward, np.gradient(middle, axis=0)))
+        corner = np.linalg.norm(middle[:, None] - skin[self._ends], axis=2).min(axis=1)
+        least = np.minimum(self.options.rest_mm, _LEAST_SLOPE * corner)
+        short = np.maximum(least - ((skin[a] - skin[b]) * up).sum(axis=1), 0.0)
+        wishes, hold = np.zeros_like(skin), np.zeros(len(skin))
+        wishes[a], wishes[b] = 0.5 * short[:, None] * up, -0.5 * short[:, None] * up
+        hold[a] = hold[b] = 1.0
+        return self._of_head(self.spread(wishes, _PIN * hold, _LOCAL_MM[0]))
+
     def _of_head(self, field):
         """(n, 3) a field of the surroundings of the lips (k, 3) as one of the whole head."""
         result = np.zeros_like(self.V)
@@ -177,7 +198,8 @@ class LipContact:
             teeth.append(watch.seen(guarded, pose[at], due, clearance))
             depth, allowed = np.linalg.norm(way, axis=1), allowed[due]
             hit = depth > allowed + self.options.touch_mm
-            wishes[self._guarded[due[hit]]] = way[hit] * ((depth - allowed)[hit] / depth[hit])[:, None]
+            farther = (depth - allowed)[hit] + self.options.off_mm
+            wishes[self._guarded[due[hit]]] = way[hit] * (farther / depth[hit])[:, None]
             counts[self._guarded[due[hit]]] = 1.0
         return wishes, np.minimum(counts, 1.0), _Watches(lips, tuple(teeth))
 

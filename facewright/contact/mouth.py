@@ -13,6 +13,7 @@ from facewright.contact.folds import SEAM_MOBILITY
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
+from facewright.contact.tongue import over_the_lip
 from facewright.conventions import (
     MOUTH_PAIRS,
     SHUT_PAIRS,
@@ -72,9 +73,10 @@ class MouthOptions:
 
 def part_lips(face, options=None):
     """The Face with a neutral whose lips neither cross nor stand in the teeth (its parts are in place)."""
-    contact = _Mouth(face, options or MouthOptions()).contact
+    mouth = _Mouth(face, options or MouthOptions())
     still = np.zeros_like(face.vertices)
-    return replace(face, vertices=face.vertices + contact.apart(lambda weight: still, (1.0,), closed=True))
+    clear = mouth.contact.apart(lambda weight: still, (1.0,), closed=True)
+    return replace(face, vertices=face.vertices + clear + mouth.contact.lifted(clear, mouth.forward))
 
 
 def solve_mouth(face, targets, options=None, jobs=1):
@@ -238,7 +240,7 @@ class _Mouth:
     def with_tongue(self, targets):
         """Targets with a corrective for a tongue that comes out of an open mouth.
 
-        It parts the teeth by itself, and both together would open the jaw farther than it goes.
+        It parts the teeth by itself, and both together would open the jaw farther than it goes; it stays on the lip.
         """
         parts = [part for part in self.face.template.parts if part.name == "teeth_lower"]
         if not parts or not {"jawOpen", "tongueOut"} <= set(targets.names):
@@ -248,11 +250,11 @@ class _Mouth:
         share = np.vdot(out[teeth], opened[teeth]) / max(np.vdot(opened[teeth], opened[teeth]), 1e-12)
         drivers = ("jawOpen", "tongueOut")
         name = corrective_name(drivers)
-        extras, correctives = (
-            targets.extras | {name: -self.options.tongue_share * share * opened},
-            targets.correctives | {name: drivers},
-        )
-        return replace(targets, extras=extras, correctives=correctives)
+        back = -self.options.tongue_share * share * opened
+        correctives = targets.correctives | {name: drivers}
+        made = replace(targets, extras=targets.extras | {name: back}, correctives=correctives)
+        motions = [(made.motion({"jawOpen": weight, "tongueOut": 1.0}), weight) for weight in (HALF, 1.0)]
+        return replace(made, extras=made.extras | {name: back + over_the_lip(self.face, motions, -opened)})
 
     def with_halves(self, targets):
         """Targets with an in-between for shapes whose way no straight line follows: it passes round the teeth."""

@@ -18,7 +18,8 @@ class ShutOptions:
     """overlap_mm by which one lip covers the other as seen from the front
     lap_mm     by which lips that are drawn apart may go on covering each other
     touch_mm   a slit narrower than this is none
-    inside_mm, outside_mm  behind and before the seam: lip that counts
+    inside_mm, outside_mm  behind and before the seam: lip that counts; lining seen before the line is a slit
+    corner_mm  from a corner of the mouth: there lips part by so little that no slit is seen
     pitch_deg  a slit counts as seen from so far above and below the front
     smooth_mm  width over which a wish is felt; reach_mm over which it fades
     rounds     of wishes
@@ -27,8 +28,9 @@ class ShutOptions:
     overlap_mm: float = 0.05
     lap_mm: float = 0.1
     touch_mm: float = 0.1
-    inside_mm: float = 2.0
+    inside_mm: float = 0.5
     outside_mm: float = 9.0
+    corner_mm: float = 1.0
     pitch_deg: float = 4.0
     smooth_mm: float = 4.0
     reach_mm: float = 9.0
@@ -52,13 +54,15 @@ class LipSlit:
         self._heights = [np.array([0.0, np.cos(pitch), turn * np.sin(pitch)]) for turn in (-1.0, 1.0)]
         self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
         self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm, asking=seam)
+        corners = cKDTree(vertices[seams[0][[0, -1]]])
+        self._asked = [corners.query(vertices[line[1:-1]])[0] > self.options.corner_mm for line in seams]
         self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]
 
     def gaps(self, skin):
         """(k,) of each line of a pose (n, 3): height in mm of the slit at its inner vertices, less than 0: covered."""
         x = skin[:, 0]
         result = []
-        for line in self.seams:
+        for line, asked in zip(self.seams, self._asked):
             at, worst = x[line[1:-1]], np.full(len(line) - 2, -np.inf)
             over = [_Crossings(at, x, edges) for edges in self._edges]
             for height in self._heights:
@@ -68,7 +72,7 @@ class LipSlit:
                 both = np.isfinite(low) & np.isfinite(high)
                 gap[both] = low[both] - high[both]
                 worst = np.maximum(worst, gap)
-            result.append(worst)
+            result.append(np.where(asked, worst, -np.inf))
         return result
 
     def wishes(self, skin, lifted=False):
@@ -81,7 +85,7 @@ class LipSlit:
             more = gap - rest
             wish = np.where(more > self.options.touch_mm, more + self.options.overlap_mm, 0.0)
             if lifted:
-                lap = np.maximum(-self.options.lap_mm - more, 0.0)
+                lap = np.maximum(-self.options.lap_mm - gap, 0.0)
                 wish = wish - np.where(np.isfinite(lap), lap, 0.0)
             move[line[1:-1]], over[line[1:-1]] = 0.5 * sign * wish, np.abs(wish)
         return move[:, None] * [0.0, 1.0, 0.0], over

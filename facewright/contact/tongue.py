@@ -1,13 +1,20 @@
-"""The tongue of an open mouth lies on its floor: a jaw that turns would carry its back up into the palate's place."""
+"""The tongue of an open mouth lies on its floor: a jaw that turns would carry its back up into the palate's place.
+
+A tongue that is out lies on the lower lip, which a jaw that opens wide draws away beneath it.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.closest import Surface
+
+_ASKED = 0.5  # lifted by less than this share is the root, which lies in the floor of the mouth
 
 
 @dataclass(frozen=True)
@@ -16,12 +23,18 @@ class TongueOptions:
     body       shares of its length from the root between which its back begins to sink and sinks as a whole
     border_mm  from where it is joined to the gums: there it stays
     most_mm    by which it sinks at most
+    front      shares of its length between which a tongue that is out begins to be lifted and is so as a whole
+    lift_shares of what the jaw did to it, tried one by one until it is off the lower lip
+    touch_mm   deeper in the lip it does not lie
     """
 
     share: float = 0.5
     body: tuple[float, float] = (0.8, 0.35)
     border_mm: float = 8.0
     most_mm: float = 18.0
+    front: tuple[float, float] = (0.25, 0.7)
+    lift_shares: tuple[float, ...] = tuple(k / 20 for k in range(15))
+    touch_mm: float = 0.2
 
 
 def lay_tongue(face, deltas, options=None):
@@ -61,3 +74,46 @@ def _sinks(vertices, faces, options):
     held = cKDTree(vertices[border]).query(vertices)[0] / options.border_mm if border.any() else 1.0
     held = np.clip(held, 0.0, 1.0)
     return t * t * (3 - 2 * t) * held * held * (3 - 2 * held)
+
+
+def over_the_lip(face, motions, way, options=None):
+    """(n, 3) share of a way by which a tongue that is out is lifted off the lower lip; the rest of the head stays.
+
+    motions  displacements (n, 3) of the poses in question, with how strongly the correction acts in each: (motion, act)
+    way      (n, 3) mm of the whole correction: the front of the tongue takes as much of it as it needs
+    """
+    options = options or TongueOptions()
+    template, still = face.template, np.zeros_like(face.vertices)
+    part = next((part for part in template.parts if part.name == "tongue"), None)
+    if part is None:
+        return still
+    at, skin = part.vertex_slice, template.skin.vertex_slice
+    faces = np.ascontiguousarray(template.faces[template.skin.face_slice])
+    lifts = _lifts(template.vertices[at], options)
+    asked = lifts > _ASKED
+    poses = [(face.vertices + motion, act) for motion, act in motions]
+
+    def deepest(share):
+        depths = [0.0]
+        for pose, act in poses:
+            points = (pose[at] + act * share * lifts[:, None] * way[at])[asked]
+            depths.append(_depth(np.ascontiguousarray(pose[skin]), faces, points))
+        return max(depths)
+
+    share = next((s for s in options.lift_shares if deepest(s) <= options.touch_mm), options.lift_shares[-1])
+    still[at] = share * lifts[:, None] * way[at]
+    return still
+
+
+def _lifts(vertices, options):
+    """(k,) 0..1: how far each vertex of a tongue (k, 3) at rest is lifted with its tip."""
+    z = vertices[:, 2]
+    start, full = options.front
+    t = np.clip(((z - z.min()) / np.ptp(z) - start) / (full - start), 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def _depth(vertices, faces, points):
+    """How deep in mm the deepest of points (k, 3) lies in the flesh between outer skin and lining."""
+    inside = np.asarray(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points))).reshape(-1) > 0.5
+    return float(Surface(vertices, faces).closest(points[inside]).distance.max()) if inside.any() else 0.0

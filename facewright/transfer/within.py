@@ -22,7 +22,7 @@ def keep_within_regions(face, deltas):
     words = read_working_set()
     skin = face.template.skin.vertex_slice
     outer = face.regions["outer"][skin]
-    scale = _scale(face)
+    scale = scale_of(face)
     result = np.array(deltas)
     fades = {}
     for i, name in enumerate(face.template.shape_names):
@@ -40,7 +40,7 @@ def keep_within_regions(face, deltas):
 
 def keep_within_amplitudes(face, deltas):
     """Shapes (s, n, 3) mm of a data.Face scaled so far as they are weaker or stronger than the working set says."""
-    words, scale = read_working_set().words, _scale(face)
+    words, scale = read_working_set().words, scale_of(face)
     outer = face.regions["outer"]
     seam = face.lines["lip_seam_upper"]  # from the person's right to the left
     result = np.array(deltas)
@@ -56,7 +56,7 @@ def keep_within_amplitudes(face, deltas):
     return result
 
 
-def _scale(face):
+def scale_of(face):
     """Factor that brings a head to 63 mm between the eyes."""
     centers = [carried_eyeball(face.template, face.vertices, side).center for side in ("left", "right")]
     return INTERPUPILLARY_MM / float(np.linalg.norm(centers[0] - centers[1]))

@@ -106,3 +106,14 @@ def test_left_is_the_mirror_of_right(hm08, hm08_person):
 def test_rest_without_faults_stays(hm08, hm08_person):
     face = replace(hm08_person(0), vertices=hm08.vertices)
     assert np.abs(part_lips(face).vertices - hm08.vertices).max() < 0.05
+
+
+def test_lips_that_touch_are_parted_a_little(hm08, hm08_person):
+    upper, lower = hm08.lines["lip_seam_upper"], hm08.lines["lip_seam_lower"]
+    touching = np.array(hm08.vertices)
+    touching[upper] = touching[lower] = 0.5 * (hm08.vertices[upper] + hm08.vertices[lower])
+    parted = part_lips(replace(hm08_person(0), vertices=touching)).vertices
+    gap = np.linalg.norm(parted[upper] - parted[lower], axis=1)
+    corner = np.linalg.norm(touching[upper][:, None] - touching[upper[[0, -1]]], axis=2).min(axis=1)
+    assert np.abs(gap[corner > 2.0] - 0.1).max() < 0.03
+    assert np.abs(parted - touching).max() < 0.1

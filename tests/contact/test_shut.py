@@ -29,7 +29,7 @@ def slit():
 
 def test_lips_that_touch_have_no_slit(slit):
     V, lips, _ = slit
-    assert max(np.abs(gap).max() for gap in lips.gaps(V)) < 1e-9
+    assert max(np.abs(gap[1:-1]).max() for gap in lips.gaps(V)) < 1e-9
     assert not lips.shut(V).any()
 
 
@@ -58,3 +58,21 @@ def test_a_slit_of_the_neutral_may_stay():
     everywhere, both = np.ones(2 * n, bool), np.concatenate([faces, others + n])
     lips = LipSlit(V, both, [faces, others + n], [seam, seam + n], everywhere, everywhere)
     assert not lips.shut(V).any()
+
+
+def test_next_to_a_corner_nothing_is_a_slit(slit):
+    V, lips, n = slit
+    opened = V.copy()
+    opened[n:, 1] -= 0.5
+    for gap in lips.gaps(opened):
+        assert np.isneginf(gap[[0, -1]]).all()
+        assert np.isfinite(gap[1:-1]).all()
+
+
+def test_lips_that_cover_each_other_are_drawn_apart_but_for_what_is_meant(slit):
+    V, lips, n = slit
+    lapped = V.copy()
+    lapped[n:, 1] += 1.0
+    moved = lapped + lips.shut(lapped, lifted=True)
+    gap = np.concatenate([gap[5:-5] for gap in lips.gaps(moved)])
+    assert np.abs(gap + lips.options.lap_mm).max() < 0.15

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.contact import TongueOptions, lay_tongue
+from facewright.contact.tongue import over_the_lip
 from facewright.parts import fit_parts
 from facewright.transfer import transfer_shapes
 
@@ -35,3 +36,23 @@ def test_without_a_jaw_nothing_changes(hm08_person):
     template = replace(face.template, shape_names=("mouthPucker",), deltas=face.template.deltas[:1])
     deltas = np.zeros((1, *face.vertices.shape))
     assert lay_tongue(replace(face, template=template), deltas) is deltas
+
+
+def test_a_tongue_that_is_out_comes_off_the_lower_lip(hm08_person):
+    face = fit_parts(hm08_person(5))
+    deltas = transfer_shapes(face)
+    names, tongue = face.template.shape_names, face.template.part("tongue").vertex_slice
+    opened, out = deltas[names.index("jawOpen")], deltas[names.index("tongueOut")]
+    lowered = out.copy()
+    lowered[tongue, 1] -= 12.0 * (face.vertices[tongue, 2] > np.median(face.vertices[tongue, 2]))
+    free, low = ([(0.5 * opened + shape, 0.5)] for shape in (out, lowered))
+    assert not over_the_lip(face, free, -opened).any()
+    lift = over_the_lip(face, low, -opened)
+    others = np.ones(len(lift), bool)
+    others[tongue] = False
+    assert not lift[others].any()
+    assert lift[tongue, 1].max() > 0.5
+    root = face.vertices[tongue, 2] < np.quantile(face.vertices[tongue, 2], 0.1)
+    assert not lift[tongue][root].any()
+    moved = [(low[0][0] + 0.5 * lift, 0.5)]
+    assert np.abs(over_the_lip(face, moved, -opened)).max() < 0.2 * np.abs(lift).max()
