@@ -17,6 +17,7 @@ from dataclasses import asdict
 import numpy as np
 from cases import find_benchmark_template, fingerprint
 from common import CACHE, SCANS, peak_memory_mb, print_table
+from threadpoolctl import threadpool_limits
 
 from facewright.cli.evaluate import print_rows
 from facewright.evaluate.bars import rig_rows
@@ -53,11 +54,12 @@ def registered(template, path, fresh):
 def rigged(face, seconds):
     """The Rig of a Face, as the main job makes it; adds core seconds (the clock's, when nothing else runs)."""
     face = in_place(face)
-    start = time.process_time()
-    transfer_shapes(face)
-    seconds["transfer"], start = time.process_time() - start, time.process_time()
-    rig = rig_from_face(face)
-    seconds["contact"] = time.process_time() - start - seconds["transfer"]
+    with threadpool_limits(1, user_api="blas"):  # as in the job
+        start = time.process_time()
+        transfer_shapes(face)
+        seconds["transfer"], start = time.process_time() - start, time.process_time()
+        rig = rig_from_face(face)
+        seconds["contact"] = time.process_time() - start - seconds["transfer"]
     return rig
 
 
