@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import vertex_normals
@@ -52,32 +53,41 @@ class MouthBag:
         self.corners = np.repeat(mine, len(_SAMPLES), axis=0)
         self.shares = np.tile(_SAMPLES, (len(mine), 1))
         self._rim = border_vertices(self.patch, len(vertices))
-        depth = np.nan_to_num(-self._heights(vertices)[0], posinf=0.0)
+        depth = np.nan_to_num(-self._heights(vertices, np.arange(len(mine) * len(_SAMPLES)))[0], posinf=0.0)
         near = (depth > self.options.least_mm) & (depth < self.options.most_mm)
         self.corners, self.shares = self.corners[near], self.shares[near]
         self._wanted = np.clip(0.5 * depth[near], 0.0, self.options.flesh_mm)
+        self._surface, every = np.unique(self.patch), np.arange(len(self.corners))
+        rest = self._samples(vertices, every), vertices[self._surface]
+        self._at_rest = Watch(*rest).seen(*rest, every, np.maximum(depth[near] - self._wanted, 0.0))
 
     def tucked(self, skin):
         """(n, 3) displacement that brings the lining of a pose (n, 3) back behind the outer skin."""
-        moved = np.array(skin)
+        moved, every = np.array(skin), np.arange(len(self.corners))
+        asked = self._at_rest.due(self._samples(skin, every), skin[self._surface])
         for _ in range(self.options.rounds):
-            height, normal = self._heights(moved)
-            over = height + self._wanted
-            out = np.flatnonzero((over > _NOTHING_MM) & (height < self.options.most_mm))
-            if not len(out):
+            height, normal = self._heights(moved, asked)
+            over = height + self._wanted[asked]
+            coming = (over > _NOTHING_MM) & (height < self.options.most_mm)
+            if not coming.any():
                 break
+            out, over, normal, asked = asked[coming], over[coming], normal[coming], every
             shares = self.shares[out]
             pull = shares * self.free[self.corners[out]]
-            pull = pull / np.maximum((shares * pull).sum(axis=1, keepdims=True), _LEAST_SHARE) * over[out, None]
+            pull = pull / np.maximum((shares * pull).sum(axis=1, keepdims=True), _LEAST_SHARE) * over[:, None]
             total, count = np.zeros_like(skin), np.zeros(len(skin))
-            np.add.at(total, self.corners[out], -(pull * shares)[..., None] * normal[out, None])
+            np.add.at(total, self.corners[out], -(pull * shares)[..., None] * normal[:, None])
             np.add.at(count, self.corners[out], shares)
             moved += total / np.maximum(count, 1e-9)[:, None]
         return moved - skin
 
-    def _heights(self, skin):
-        """(k,) how far the samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
-        points = np.einsum("kc,kcd->kd", self.shares, skin[self.corners])
+    def _samples(self, skin, index):
+        """(k, 3) points of the lining that are asked about."""
+        return np.einsum("kc,kcd->kd", self.shares[index], skin[self.corners[index]])
+
+    def _heights(self, skin, index):
+        """(k,) how far samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
+        points = self._samples(skin, index)
         found = Surface(skin, self.patch).closest(points)
         normal = interpolate(vertex_normals(skin, self.faces), self.patch, found.faces, found.barycentric)
         height = ((points - found.points) * normal).sum(axis=1)
