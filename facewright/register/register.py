@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
 from facewright.mesh.untangle import unfolded, untangled
 from facewright.register.correspond import Target
+from facewright.register.ears import ear_motion
 from facewright.register.interior import tuck_interior
 from facewright.register.leading import leading_lines
 from facewright.register.localize import localized_basis
@@ -69,6 +70,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     pairs = landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
     model, names = _fit_model(template, target, pairs, closed, options.model)
+    model = _with_ears(template, target, model)
     leading, line_stats = leading_lines(scan, template, model, pairs, closed)
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
@@ -152,6 +154,15 @@ def _fit_model(template, target, pairs, closed, options):
         options,
     )
     return model, names
+
+
+def _with_ears(template, target, model):
+    """The ModelFit with ears where and as large as the scan's."""
+    stop = template.skin.vertices[1]
+    ears = [template.regions[f"ear_{side}"][:stop] for side in SIDES]
+    motion = np.zeros_like(model.vertices)
+    motion[:stop] = ear_motion(model.vertices[:stop], template.faces[template.skin.face_slice], ears, target)
+    return replace(model, vertices=model.vertices + motion, rest=model.rest + motion)
 
 
 def _unfolded(template, skin, faces, matches):

@@ -1,0 +1,183 @@
+"""Ears brought to the scan's as a whole, in place and size, before the skin is fitted.
+
+They are too thin, and too much alike from fold to fold, for nearest points to lead them home one by one: a small ear
+settles in the hollow of a large one. What stands out of the head tells place and size; pairs both ways do the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.mesh.adjacency import dilate
+from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.laplacian import lumped_mass, uniform_laplacian
+from facewright.mesh.normals import face_normals, vertex_normals
+from facewright.mesh.spread import spread_smoothly
+from facewright.solve.procrustes import best_similarity
+from facewright.solve.quadratic import Factorization
+
+_RINGS = 6  # of the head around an ear that the scan's skin may be near to
+
+
+@dataclass(frozen=True)
+class EarOptions:
+    """out_mm   above the head without its ear, from which on, and beyond which wholly, a point is the ear's
+    far_mm     pairs farther apart are none; angle_deg: nor those whose normals differ by more
+    tau_mm     scale of the Geman-McClure weight of a pair
+    scale      bounds of an ear's size against the model's
+    rounds     of pairing and fitting at most, until the ear moves by less than still_mm
+    points     of the scan that are asked
+    blend_mm   over which the head around follows
+    fits_mm    an ear this near to the scan's stays
+    better, left_mm, covered  an ear is believed whose distance from the scan's falls to this share and to this mean,
+               and of which the scan shows this share
+    """
+
+    out_mm: tuple[float, float] = (4.0, 6.0)
+    far_mm: float = 14.0
+    angle_deg: float = 60.0
+    tau_mm: float = 4.0
+    scale: tuple[float, float] = (0.7, 1.45)
+    rounds: int = 30
+    still_mm: float = 0.1
+    points: int = 800
+    blend_mm: float = 30.0
+    fits_mm: float = 1.0
+    better: float = 0.85
+    left_mm: float = 2.5
+    covered: float = 0.6
+
+
+class _Pairs(NamedTuple):
+    """Points (k, 3) of an ear, the scan's (k, 3) that they belong to, weights (k,); mean distance, share covered."""
+
+    source: np.ndarray
+    wanted: np.ndarray
+    weights: np.ndarray
+    mean_mm: float
+    covered: float
+
+
+def ear_motion(vertices, faces, ears, target, options=None):
+    """(n, 3) displacement that brings the ears of a skin to a scan's; none for an ear that fits or that hair hides.
+
+    vertices (n, 3) mm near the scan, faces (m, 3); ears: masks (n,); target: correspond.Target
+    """
+    options = options or EarOptions()
+    result = np.zeros_like(vertices)
+    for mask in ears:
+        ear = _Ear(vertices, faces, np.flatnonzero(mask), target, options) if mask.any() else None
+        similarity = ear.fitted() if ear else None
+        if similarity is not None:
+            R, scale, t = similarity
+            led = ear.index[ear.height > options.out_mm[0]]
+            free = cKDTree(vertices[led]).query(vertices)[0] < options.blend_mm
+            motion = scale * vertices[led] @ R.T + t - vertices[led]
+            result += spread_smoothly(vertices, faces, led, motion, free, options.blend_mm / 2)
+    return result
+
+
+class _Ear:
+    """One ear of a skin, and what of the scan stands out near it."""
+
+    def __init__(self, vertices, faces, index, target, options):
+        self.index, self.target, self.options = index, target, options
+        place = np.full(len(vertices), -1)
+        place[index] = np.arange(len(index))
+        patch = place[faces]
+        self.patch = patch[(patch >= 0).all(axis=1)]
+        self.vertices, self.normals = vertices[index], vertex_normals(vertices, faces)[index]
+        center = vertices[index].mean(axis=0)
+        reach = np.linalg.norm(vertices[index] - center, axis=1).max() + options.far_mm
+        near = np.flatnonzero(np.linalg.norm(target.vertices - center, axis=1) < reach)
+        self.near = near[:: max(len(near) // options.points, 1)]
+        head = _without_ear(vertices, faces, index)
+        self.height = _height(vertices[index], head)
+        shown = target.faces[np.isin(target.faces[:, 0], near)]
+        area = lumped_mass(vertices, faces)[index], lumped_mass(target.vertices, shown)[self.near]
+        low, high = options.out_mm
+        heights = self.height, _height(target.vertices[self.near], head)
+        self.own, self.there = (a * np.clip((h - low) / (high - low), 0.0, 1.0) for a, h in zip(area, heights))
+
+    def fitted(self):
+        """(R, scale, t) of the ear; None where the scan shows no such ear, or where the ear fits as it is."""
+        if not self.own.any() or not self.there.any():
+            return None
+        stays = np.eye(3), 1.0, np.zeros(3)
+        now = self._distance(stays)
+        if now < self.options.fits_mm:
+            return None
+        best = min((self._settled(start) for start in (stays, self._by_outline())), key=self._distance)
+        pairs = self._pairs(best)
+        believed = pairs.mean_mm < self.options.left_mm and pairs.covered > self.options.covered
+        return best if believed and self._distance(best) < self.options.better * now else None
+
+    def _by_outline(self):
+        """What stands out of the head laid on what stands out of the scan, by centre and spread."""
+        moments = []
+        for points, weight in ((self.vertices, self.own), (self.target.vertices[self.near], self.there)):
+            mean = weight @ points / weight.sum()
+            moments.append((mean, np.sqrt(weight @ ((points - mean) ** 2).sum(axis=1) / weight.sum())))
+        (mean, size), (wanted, wanted_size) = moments
+        scale = float(np.clip(wanted_size / size, *self.options.scale))
+        return np.eye(3), scale, wanted - scale * mean
+
+    def _settled(self, similarity):
+        for _ in range(self.options.rounds):
+            pairs = self._pairs(similarity)
+            if not pairs.weights.any():
+                break
+            before = self._placed(similarity)
+            R, scale, t = similarity
+            back = (pairs.source - t) @ R / scale
+            similarity = best_similarity(back, pairs.wanted, pairs.weights, self.options.scale)
+            if np.abs(self._placed(similarity) - before).max() < self.options.still_mm:
+                break
+        return similarity
+
+    def _placed(self, similarity):
+        R, scale, t = similarity
+        return scale * self.vertices @ R.T + t
+
+    def _distance(self, similarity):
+        """Mean distance of what stands out of the scan from the ear, mm."""
+        found = Surface(self._placed(similarity), self.patch).closest(self.target.vertices[self.near])
+        return self.there @ np.minimum(found.distance, self.options.far_mm) / self.there.sum()
+
+    def _pairs(self, similarity):
+        options, moved, normals = self.options, self._placed(similarity), self.normals @ similarity[0].T
+        match = self.target.match(moved, normals, max_distance=options.far_mm, max_angle_deg=options.angle_deg)
+        found = Surface(moved, self.patch).closest(self.target.vertices[self.near])
+        own = interpolate(normals, self.patch, found.faces, found.barycentric)
+        alike = (own * self.target.normals[self.near]).sum(axis=1) > np.cos(np.radians(options.angle_deg))
+        inside = (found.barycentric > 1e-6).all(axis=1)  # past the ear's border lies the head
+        chosen = alike & inside & (found.distance < options.far_mm)
+        source = np.concatenate([moved, found.points[chosen]])
+        wanted = np.concatenate([match.points, self.target.vertices[self.near][chosen]])
+        distance = np.concatenate([match.distance, found.distance[chosen]])
+        both = match.weights / max(match.weights.sum(), 1e-9), np.full(chosen.sum(), 1.0 / max(chosen.sum(), 1))
+        weights = np.concatenate(both) * (options.tau_mm**2 / (options.tau_mm**2 + distance**2)) ** 2
+        met = match.weights > 0
+        return _Pairs(source, wanted, weights, float(match.distance[met].mean()) if met.any() else np.inf, met.mean())
+
+
+def _without_ear(vertices, faces, ear):
+    """The Surface of a head whose ear (k,) is a membrane over the hole that it would leave."""
+    head, laplacian = vertices.copy(), uniform_laplacian(faces, len(vertices)).tocsr()
+    rest = np.setdiff1d(np.arange(len(vertices)), ear)
+    rows = laplacian[ear]
+    head[ear] = Factorization(rows[:, ear]).solve(-(rows[:, rest] @ vertices[rest]))
+    around = np.zeros(len(vertices), bool)
+    around[ear] = True
+    around = dilate(around, faces, _RINGS)
+    return Surface(head, faces[around[faces].any(axis=1)])
+
+
+def _height(points, head):
+    """(k,) mm of points (k, 3) above a Surface."""
+    found = head.closest(points)
+    return ((points - found.points) * face_normals(head.vertices, head.faces)[found.faces]).sum(axis=1)

@@ -1,0 +1,44 @@
+"""Ears larger, smaller and elsewhere than the model's are found as a whole; what hides them leaves them alone."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from facewright.register.correspond import Target
+from facewright.register.ears import _without_ear, ear_motion
+
+
+@pytest.fixture(scope="module")
+def head(hm08):
+    n = hm08.skin.vertices[1]
+    ears = [hm08.regions[f"ear_{side}"][:n] for side in ("left", "right")]
+    return hm08.vertices[:n], hm08.faces[hm08.skin.face_slice], ears
+
+
+def with_other_ears(V, ears, scale, shift):
+    """Vertices whose ears are scaled about their own centre and shifted outwards, the head around following."""
+    moved = V.copy()
+    for ear, sign in zip(ears, (1.0, -1.0)):
+        center = V[ear].mean(axis=0)
+        share = np.clip(1.0 - cKDTree(V[ear]).query(V)[0] / 15.0, 0.0, 1.0)[:, None]
+        moved += share * ((scale - 1.0) * (V - center) + np.array(shift) * [sign, 1.0, 1.0])
+    return moved
+
+
+@pytest.mark.parametrize("scale, shift", [(1.3, (0.0, 3.0, -2.0)), (0.8, (0.0, -2.0, 0.0)), (1.0, (0.0, 7.0, -5.0))])
+def test_other_ears_are_found(head, scale, shift):
+    V, F, ears = head
+    scan = with_other_ears(V, ears, scale, shift)
+    moved = V + ear_motion(V, F, ears, Target(scan, F))
+    for ear in ears:
+        before, after = (np.linalg.norm((x - scan)[ear], axis=1).mean() for x in (V, moved))
+        assert after < 0.4 * before
+
+
+def test_ears_that_fit_and_ears_that_are_hidden_stay(head):
+    V, F, ears = head
+    assert not ear_motion(V, F, ears, Target(V, F)).any()
+    bare = V.copy()
+    for ear in ears:
+        bare = _without_ear(bare, F, np.flatnonzero(ear)).vertices
+    assert not ear_motion(V, F, ears, Target(bare, F)).any()
