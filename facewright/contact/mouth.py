@@ -240,19 +240,22 @@ class _Mouth:
     def with_tongue(self, targets):
         """Targets with a corrective for a tongue that comes out of an open mouth.
 
-        It parts the teeth by itself, and both together would open the jaw farther than it goes; it stays on the lip.
+        It parts the teeth by itself, and both together would open the jaw farther than it goes; it stays on the lip, by
+        itself and with the jaw.
         """
         parts = [part for part in self.face.template.parts if part.name == "teeth_lower"]
         if not parts or not {"jawOpen", "tongueOut"} <= set(targets.names):
             return targets
         teeth = parts[0].vertex_slice
         opened, out = targets.delta("jawOpen"), targets.delta("tongueOut")
+        deltas = np.array(targets.deltas)
+        deltas[targets.names.index("tongueOut")] += over_the_lip(self.face, [(out, 1.0)], -opened)
         share = np.vdot(out[teeth], opened[teeth]) / max(np.vdot(opened[teeth], opened[teeth]), 1e-12)
         drivers = ("jawOpen", "tongueOut")
         name = corrective_name(drivers)
         back = -self.options.tongue_share * share * opened
         correctives = targets.correctives | {name: drivers}
-        made = replace(targets, extras=targets.extras | {name: back}, correctives=correctives)
+        made = replace(targets, deltas=deltas, extras=targets.extras | {name: back}, correctives=correctives)
         motions = [(made.motion({"jawOpen": weight, "tongueOut": 1.0}), weight) for weight in (HALF, 1.0)]
         return replace(made, extras=made.extras | {name: back + over_the_lip(self.face, motions, -opened)})
 
