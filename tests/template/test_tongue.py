@@ -1,5 +1,7 @@
 """A tongue over the floor of a mouth, both one surface as in a scanned one, comes out over a point."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -59,12 +61,10 @@ def brought_out(mouth, share=0.0, thin=0.0):
 
 @pytest.fixture(scope="module")
 def mouth():
-    """Root, back, tip, underside, the pit beneath it, and the floor forward to the gums; sides of the floor are joined."""
+    """Root, back, tip, underside, the pit beneath, and the floor forward to the gums, whose sides are joined too."""
     ways = [(-40.0, TOP), (FRONT, TOP), (FRONT, BENEATH), (-16.0, BENEATH), (-16.0, FLOOR), (4.0, FLOOR)]
-    profile = np.concatenate(
-        [np.linspace(a, b, round(np.hypot(*np.subtract(a, b)) / 2.0), endpoint=False) for a, b in zip(ways, ways[1:])]
-        + [np.array(ways[-1:])]
-    )
+    steps = [(a, b, round(np.hypot(*np.subtract(a, b)) / 2.0)) for a, b in pairwise(ways)]
+    profile = np.concatenate([*(np.linspace(a, b, k, endpoint=False) for a, b, k in steps), ways[-1:]])
     x = np.linspace(-10.0, 10.0, 9)
     V = np.concatenate([np.column_stack([x, np.full(9, y), np.full(9, z)]) for z, y in profile])
     at = np.arange(len(V)).reshape(-1, 9)
