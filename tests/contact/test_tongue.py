@@ -74,3 +74,5 @@ def test_a_tongue_that_is_out_lies_on_the_lip_by_itself_too(hm08_person):
     for weight in (0.0, 0.5, 1.0):
         mouth = _Mouth(after, {"tongueOut": 1.0, "jawOpen": weight}, True)
         assert mouth.tongue_in_flesh_mm() < 0.5 and mouth.tongue_out_mm() > 5.0
+        mouth = _Mouth(after, {"tongueOut": 0.5, "jawOpen": weight}, True)
+        assert mouth.tongue_in_flesh_mm() < 0.5
