@@ -55,6 +55,7 @@ class MouthOptions:
     flat_mm      from the seam: skin that may give way where a shape folds it
     window_mm    width over the midline over which left hands over to right
     tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
+    tongue_half  shares of its whole way by which the mouth is parted and the tongue has come at half: first it opens
     once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
     halves       shapes that get an in-between at half
     pairs        shapes, or both sides of them, that get a corrective together
@@ -64,6 +65,7 @@ class MouthOptions:
     close: MouthCloseOptions = field(default_factory=MouthCloseOptions)
     flat_mm: float = 12.0
     tongue_share: float = 0.5
+    tongue_half: tuple[float, float] = (0.85, 0.35)
     once: tuple[str, ...] = ("mouthFunnel", "mouthPucker")
     once_share: float = 0.6
     window_mm: float = 44.0
@@ -238,21 +240,35 @@ class _Mouth:
         return replace(targets, extras=extras)
 
     def with_tongue(self, targets):
-        """Targets with a corrective for a tongue that comes out of an open mouth.
+        """Targets with a corrective for a tongue that comes out of an open mouth, and an in-between for its way.
 
-        It parts the teeth by itself, and both together would open the jaw farther than it goes; it stays on the lip.
+        It parts the teeth by itself, and both together would open the jaw farther than it goes. By itself, with the jaw
+        and half way it lies on the lower lip.
         """
-        parts = [part for part in self.face.template.parts if part.name == "teeth_lower"]
-        if not parts or not {"jawOpen", "tongueOut"} <= set(targets.names):
+        parts = {part.name: part.vertex_slice for part in self.face.template.parts}
+        if not {"teeth_lower", "tongue"} <= set(parts) or not {"jawOpen", "tongueOut"} <= set(targets.names):
             return targets
-        teeth = parts[0].vertex_slice
-        opened, out = targets.delta("jawOpen"), targets.delta("tongueOut")
+        teeth, tongue = parts["teeth_lower"], parts["tongue"]
+        opened, out = targets.delta("jawOpen"), np.array(targets.delta("tongueOut"))
         share = np.vdot(out[teeth], opened[teeth]) / max(np.vdot(opened[teeth], opened[teeth]), 1e-12)
+        out += over_the_lip(self.face, [(out, 1.0)], -opened)
+        parted = np.array(out)
+        parted[tongue] = share * opened[tongue]
+        parts_first, comes = self.options.tongue_half
+        on_way = comes * out + (parts_first - comes) * parted
+        on_way += over_the_lip(self.face, [(on_way, 1.0)], -opened)
+        deltas, half = np.array(targets.deltas), in_between_name("tongueOut", HALF)
+        deltas[targets.names.index("tongueOut")] = out
         drivers = ("jawOpen", "tongueOut")
         name = corrective_name(drivers)
         back = -self.options.tongue_share * share * opened
-        correctives = targets.correctives | {name: drivers}
-        made = replace(targets, extras=targets.extras | {name: back}, correctives=correctives)
+        made = replace(
+            targets,
+            deltas=deltas,
+            extras=targets.extras | {half: on_way, name: back},
+            in_betweens=targets.in_betweens | {"tongueOut": {HALF: half}},
+            correctives=targets.correctives | {name: drivers},
+        )
         motions = [(made.motion({"jawOpen": weight, "tongueOut": 1.0}), weight) for weight in (HALF, 1.0)]
         return replace(made, extras=made.extras | {name: back + over_the_lip(self.face, motions, -opened)})
 

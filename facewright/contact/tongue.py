@@ -24,7 +24,7 @@ class TongueOptions:
     border_mm  from where it is joined to the gums: there it stays
     most_mm    by which it sinks at most
     front      shares of its length between which a tongue that is out begins to be lifted and is so as a whole
-    lift_shares of what the jaw did to it, tried one by one until it is off the lower lip
+    lift_shares of what the jaw did to it: the first that brings it off the lower lip, or as far off as any
     touch_mm   deeper in the lip it does not lie
     """
 
@@ -100,7 +100,7 @@ def over_the_lip(face, motions, way, options=None):
             depths.append(_depth(np.ascontiguousarray(pose[skin]), faces, points))
         return max(depths)
 
-    share = next((s for s in options.lift_shares if deepest(s) <= options.touch_mm), options.lift_shares[-1])
+    share = min(options.lift_shares, key=lambda share: max(deepest(share), options.touch_mm))
     still[at] = share * lifts[:, None] * way[at]
     return still
 

@@ -21,6 +21,7 @@ from facewright.template.regions import Head, skin_openness, skin_regions, still
 from facewright.template.skeleton import head_skeleton
 from facewright.template.source import read_description, read_source_mesh, read_source_vertices
 from facewright.template.symmetry import mirror_map, symmetrized
+from facewright.template.tongue import tongue_out
 
 
 def build_template(source_folder, description_path):
@@ -218,13 +219,21 @@ def _shape_rules(description, shaped, vertices, names, deltas, head, lines):
 
 def _tongue_out(options, shaped, vertices, jaw_open, lips):
     """(n, 3) the tongue comes out between lips and teeth that part by a share of jawOpen; lips (3,) their middle."""
-    part = shaped.part("tongue")
-    points, faces = _part_mesh(shaped, vertices, part)
-    delta = float(options["jaw_open"]) * jaw_open
+    tongue, teeth = shaped.part("tongue"), vertices[shaped.part("teeth_lower").vertex_slice]
+    points, faces = _part_mesh(shaped, vertices, tongue)
     border = np.flatnonzero(border_vertices(faces, len(points)))
-    target = lips + [0.0, -float(options["drop_mm"]), float(options["out_mm"])]
-    delta[part.vertex_slice] = rules.tongue_out(
-        points, faces, border, delta[part.vertex_slice], target, thin=float(options["thin"])
+    share = float(options["jaw_open"])
+    delta = share * jaw_open
+    edge = teeth[np.abs(teeth[:, 0]) < points[:, 0].max(), 1].max()
+    delta[tongue.vertex_slice] = tongue_out(
+        points,
+        faces,
+        border,
+        jaw_open[tongue.vertex_slice],
+        [0.0, max(lips[1], edge), lips[2]],
+        lips + [0.0, -float(options["drop_mm"]), float(options["out_mm"])],
+        share=share,
+        thin=float(options["thin"]),
     )
     return delta
 

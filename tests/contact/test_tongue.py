@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from facewright.contact import TongueOptions, lay_tongue
+from facewright.contact import Targets, TongueOptions, lay_tongue, solve_mouth
+from facewright.contact.mouth import MouthOptions
 from facewright.contact.tongue import over_the_lip
-from facewright.parts import fit_parts
+from facewright.evaluate.teeth import _Mouth
+from facewright.parts import build_rig, fit_parts
 from facewright.transfer import transfer_shapes
 
 
@@ -56,3 +58,21 @@ def test_a_tongue_that_is_out_comes_off_the_lower_lip(hm08_person):
     assert not lift[tongue][root].any()
     moved = [(low[0][0] + 0.5 * lift, 0.5)]
     assert np.abs(over_the_lip(face, moved, -opened)).max() < 0.2 * np.abs(lift).max()
+
+
+def test_a_tongue_that_is_out_lies_on_the_lip_by_itself_too(hm08_person):
+    face = fit_parts(hm08_person(5))
+    carried, tongue = transfer_shapes(face), face.template.part("tongue").vertex_slice
+    names = ("jawOpen", "tongueOut")
+    deltas = carried[[face.template.shape_names.index(name) for name in names]]
+    low = deltas.copy()
+    low[1, tongue, 1] -= 5.0 * (face.vertices[tongue, 2] > np.median(face.vertices[tongue, 2]))
+    solved = solve_mouth(face, Targets(names, low), MouthOptions(pairs=()))
+    face = replace(face, template=replace(face.template, shape_names=names, deltas=low))
+    before, after = (build_rig(face, targets.deltas, eyes=targets) for targets in (Targets(names, low), solved))
+    assert _Mouth(before, {"tongueOut": 1.0}, True).tongue_in_flesh_mm() > 1.0
+    for weight in (0.0, 0.5, 1.0):
+        mouth = _Mouth(after, {"tongueOut": 1.0, "jawOpen": weight}, True)
+        assert mouth.tongue_in_flesh_mm() < 0.5 and mouth.tongue_out_mm() > 5.0
+        mouth = _Mouth(after, {"tongueOut": 0.5, "jawOpen": weight}, True)
+        assert mouth.tongue_in_flesh_mm() < 0.5

@@ -51,22 +51,6 @@ def test_even_eyes_keep_a_sphere_round_and_pass_a_scaled_one():
     assert np.ptp(ratio) < 1e-12
 
 
-def test_tongue_tip_arrives_and_its_border_follows_the_jaw():
-    z, x = np.meshgrid(np.linspace(-40, 10, 21), np.linspace(-10, 10, 9))
-    V = np.stack([x, -70 - z / 10, z], axis=-1).reshape(-1, 3)
-    F = np.array([f for r in range(8) for c in range(20) for f in _quad(r * 21 + c, 21)])
-    border = np.flatnonzero(V[:, 2] == -40)
-    jaw = np.tile([0.0, -5.0, -1.0], (len(V), 1))
-    delta = rules.tongue_out(V, F, border, jaw, [0.0, -75.0, 45.0], thin=0.0)
-    tip = V[:, 2] == 10
-    assert np.allclose((V + delta)[tip].mean(axis=0), [0, -75, 45], atol=0.6)
-    assert np.allclose(delta[border], jaw[border])
-
-
-def _quad(a, row):
-    return [[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]
-
-
 def test_hinge_finds_axis_and_angle():
     points = np.random.default_rng(5).normal(size=(30, 3)) * 20
     center, angle = np.array([0, -41.5, -60.8]), np.radians(25.3)
