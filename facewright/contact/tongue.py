@@ -91,17 +91,17 @@ def over_the_lip(face, motions, way, options=None):
     faces = np.ascontiguousarray(template.faces[template.skin.face_slice])
     lifts = _lifts(template.vertices[at], options)
     asked = lifts > _ASKED
-    poses = [(face.vertices + motion, act) for motion, act in motions]
-
-    def deepest(share):
-        depths = [0.0]
-        for pose, act in poses:
-            points = (pose[at] + act * share * lifts[:, None] * way[at])[asked]
-            depths.append(_depth(np.ascontiguousarray(pose[skin]), faces, points))
-        return max(depths)
-
-    share = min(options.lift_shares, key=lambda share: max(deepest(share), options.touch_mm))
-    still[at] = share * lifts[:, None] * way[at]
+    posed = [(face.vertices + motion, act) for motion, act in motions]
+    poses = [(_Flesh(np.ascontiguousarray(pose[skin]), faces), pose[at], act) for pose, act in posed]
+    best, least = 0.0, np.inf
+    for share in options.lift_shares:
+        lift = share * lifts[:, None] * way[at]
+        depth = max((flesh.depth((tongue + act * lift)[asked]) for flesh, tongue, act in poses), default=0.0)
+        if depth < least:
+            best, least = share, depth
+        if depth <= options.touch_mm:
+            break
+    still[at] = best * lifts[:, None] * way[at]
     return still
 
 
@@ -113,7 +113,14 @@ def _lifts(vertices, options):
     return t * t * (3 - 2 * t)
 
 
-def _depth(vertices, faces, points):
-    """How deep in mm the deepest of points (k, 3) lies in the flesh between outer skin and lining."""
-    inside = np.asarray(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points))).reshape(-1) > 0.5
-    return float(Surface(vertices, faces).closest(points[inside]).distance.max()) if inside.any() else 0.0
+class _Flesh:
+    """What lies between outer skin and lining of a pose: vertices (n, 3), faces (m, 3)."""
+
+    def __init__(self, vertices, faces):
+        self._surface, self._tree = Surface(vertices, faces), igl.FastWindingNumberBVH()
+        self._tree.init(self._surface.vertices, self._surface.faces)
+
+    def depth(self, points):
+        """How deep in mm the deepest of points (k, 3) lies in it."""
+        inside = np.asarray(self._tree.winding_number(np.ascontiguousarray(points))).reshape(-1) > 0.5
+        return float(self._surface.closest(points[inside]).distance.max()) if inside.any() else 0.0
