@@ -169,8 +169,8 @@ def block_bound(textures, k=4, block=8):
 def search_curves(textures, masks=53, restarts=100, seed=0):
     """The permutation search against the published one on identical masks, as a dict.
 
-    history  (11, restarts) cost of every random restart, sweep by sweep; ours: cost by seed; bound that no state can
-    be below; seconds of one search
+    history  (11, restarts) cost of every random restart, sweep by sweep; ours: cost by seed; search: the
+    PermutationSearch; seconds of one search
     """
     tiles = TextureTiles.of(_image(textures.neutral), [_image(x) for x in textures.textures], textures.covered)
     values, _ = build_masks(textures.mesh, tiles.grid, masks, seed=seed)
@@ -180,7 +180,7 @@ def search_curves(textures, masks=53, restarts=100, seed=0):
     for number in (0, 1):
         ours[number] = float(search.cost(search.solve(number)[None])[0])
     seconds = (time.perf_counter() - started) / 2
-    return {"history": history, "ours": ours, "bound": search.bound(), "seconds": seconds, "masks": values.shape[2]}
+    return {"history": history, "ours": ours, "search": search, "seconds": seconds, "masks": search.m}
 
 
 def mask_curve(textures, counts=MASK_COUNTS):
