@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import threading
@@ -48,15 +49,19 @@ def build_parser():
 
 @contextmanager
 def _interrupted_when_ended():
-    """A request to end (SIGTERM) is like Ctrl-C: what was begun is tidied up."""
+    """A request to end (SIGTERM, SIGHUP of a closed terminal) is like Ctrl-C: what was begun is tidied up."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    kinds = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    # A signal that is ignored stays so: nohup.
+    kinds = [kind for kind in kinds if signal.getsignal(kind) != signal.SIG_IGN]
+    before = {kind: signal.signal(kind, signal.default_int_handler) for kind in kinds}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
 
 
 def main(arguments=None):
@@ -66,13 +71,21 @@ def main(arguments=None):
         with _interrupted_when_ended(), warnings.catch_warnings():
             # Broken input overflows on its way to the sentence that says so; the rest is in the report.
             warnings.simplefilter("ignore", RuntimeWarning)
-            return options.run(options) or 0
+            code = options.run(options) or 0
+            sys.stdout.flush()
+            return code
     except InputError as error:
         print(f"facewright: {error}", file=sys.stderr)
         return 2
     except StageError as error:
         print(f"facewright: {error} (outcome: {error.outcome})", file=sys.stderr)
         return 1
+    except OSError as error:
+        if sys.stdout is sys.__stdout__:  # a reader that is gone, a full disk: nothing more can be said there
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"facewright: {where}cannot be read or written ({error.strerror or error})", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         again = options.command in ("rig", "demo")
         more = "; the same command goes on from the last finished stage" if again else ""

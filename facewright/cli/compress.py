@@ -30,7 +30,7 @@ def add_arguments(parser):
     )
     parser.add_argument("--region", metavar="IMAGE", help="where --method paper samples its masks")
     parser.add_argument("--keep", action="append", default=[], metavar="NAME", help="store this texture exactly")
-    parser.add_argument("--priority", metavar="IMAGE", help="grey image: white counts ten times as much as black")
+    parser.add_argument("--priority", metavar="IMAGE", help="grey image: where errors count up to ten times (white): helps lines finer than 8 texels, hardly whole regions")
     parser.add_argument(
         "--examples", metavar="CSV", help="weights of example-based shapes: rows textures, columns shapes"
     )
@@ -152,19 +152,24 @@ def write_previews(packed, folder, reader, names, examples):
     return notes
 
 
+def counted(count, what):
+    """ "1 texture", "2 textures"."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def print_summary(packed, about, reader, examples, results):
     """Bytes and errors, a line a map."""
     size = about["bytes"]
     count = len(next(iter(packed.values())).names)
     raw = sum(one.neutral.nbytes * (count + 1) for one in packed.values()) / 1e6
-    print(f"{count} textures: {size['memory'] / 1e6:.2f} MB in memory, {size['png'] / 1e6:.2f} as PNG, raw {raw:.1f}")
+    print(f"{counted(count, 'texture')}: {size['memory'] / 1e6:.2f} MB in memory, {size['png'] / 1e6:.2f} as PNG, raw {raw:.1f}")
     if "ktx2" in size:
         print(f"KTX2 with mip-maps: {size['ktx2'] / 1e6:.2f} MB on disk, {size['memory_ktx2'] / 1e6:.2f} in GPU memory")
     for name, one in packed.items():
         rmse, report = one.report["rmse"], one.report
         worst = max(rmse, key=rmse.__getitem__)
         reading, whole = report["seconds"]["reading"], sum(report["seconds"].values())
-        print(f"{name}: {len(one.textures)} difference textures, {whole - reading:.1f} s, reading {reading:.1f} s")
+        print(f"{name}: {counted(len(one.textures), 'difference texture')}, {whole - reading:.1f} s, reading {reading:.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
         if report["solution"] == "exact":
             step = one.texture_step[(one.textures != one.texture_zero[:, None, None]).any(axis=(1, 2))].max(initial=0)
@@ -233,7 +238,7 @@ class _Reader:
         if not off:
             return []
         worst = max(off, key=lambda stem: off[stem].p95)
-        many = "1 texture lies" if len(off) == 1 else f"{len(off)} textures lie"
+        many = f"{counted(len(off), 'texture')} {'lies' if len(off) == 1 else 'lie'}"
         told = f"{many} off the neutral, {worst} by up to {off[worst].p95:.1f} texels"
         return [f"{told}: warped back" if align else f"{told}; --align warps them back"]
 

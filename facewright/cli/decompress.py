@@ -41,7 +41,9 @@ def run(options):
 def parse_weights(text):
     """dict name -> weight of "a=1,b=0.5"; a comma before the next = belongs to a name."""
     weights, item = {}, ""
-    for part in filter(None, (part.strip() for part in text.split(","))):
+    for part in text.split(","):
+        if not item and not part.strip():
+            continue
         item += part
         name, equals, value = item.rpartition("=")
         if not equals:

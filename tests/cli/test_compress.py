@@ -209,7 +209,7 @@ def test_tables_that_say_too_little_are_refused(tmp_path, command, capsys, rows,
 
 @pytest.mark.parametrize(
     "weights,wanted",
-    [("smile=0.5, jaw=1", {"smile": 0.5, "jaw": 1}), ("a,b=1,c=d=-2", {"a,b": 1, "c=d": -2}), ("", {})],
+    [("smile=0.5, jaw=1", {"smile": 0.5, "jaw": 1}), ("a,b=1,c=d=-2", {"a,b": 1, "c=d": -2}), ("x, y=1 , z=2,", {"x, y": 1, "z": 2}), ("", {})],
 )
 def test_weights(weights, wanted):
     assert parse_weights(weights) == wanted
@@ -317,6 +317,14 @@ def test_a_full_disk_leaves_nothing(tmp_path, command, capsys, monkeypatch):
     assert not (tmp_path / "packed").exists()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_summary_that_cannot_be_written_is_one_sentence(tmp_path, command):
+    arguments = [sys.executable, "-m", "facewright", *command, "--out", f"{tmp_path}/packed", "--quiet"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(arguments, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and "No space left on device" in done.stderr
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_a_killed_run_leaves_no_index_and_the_next_one_cleans_up(tmp_path, command):
     out = tmp_path / "packed"
@@ -334,10 +342,11 @@ def test_a_killed_run_leaves_no_index_and_the_next_one_cleans_up(tmp_path, comma
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert not [path for path in out.iterdir() if not path.name.startswith(".facezip-")]
-    process = begin(tmp_path / "other")
-    process.send_signal(signal.SIGTERM)
-    assert "stopped" in process.communicate()[1] and process.returncode == 130
-    assert not (tmp_path / "other").exists()
+    for request in (signal.SIGTERM, signal.SIGHUP):
+        process = begin(tmp_path / "other")
+        process.send_signal(request)
+        assert "stopped" in process.communicate()[1] and process.returncode == 130
+        assert not (tmp_path / "other").exists()
     time.sleep(0.1)
     assert run(command, tmp_path) == 0
     assert not list(out.glob(".facezip-*")) and (out / "facezip.json").exists()
