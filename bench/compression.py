@@ -2,7 +2,7 @@
 
     python bench/compression.py [PART ...] [--set FOLDER ...] [--sizes 512 1024] [--restarts 2]
 
-PART  quality search seams examples time published large (default: all but large). Sets are the folders of
+PART  quality search seams priority examples time published large (default: all but large). Sets are the folders of
       ../shared/data/textures (neutral.png, mesh.obj, textures/) and generated ones. Time is of 20 generated textures,
       from decoded images to PNG and JSON; cpu is what all cores spent, quiet what two cores would need that do
       nothing else: the main thread's seconds and half of the others'.
@@ -26,13 +26,15 @@ from common import ROOT, Verdict, print_table
 from compression_bound import triple_bound
 from compression_published import published_procedure
 
-from facewright.compress import example_weights, facezip
+from facewright.compress import FacezipOptions, example_weights, facezip
 from facewright.compress.evaluation import (
     METHODS,
     TextureSet,
     block_bound,
     decode_float,
+    decode_one,
     measure,
+    rms_error,
     run_method,
     search_curves,
 )
@@ -45,13 +47,12 @@ from facewright.compress.synthetic import ExpressionSource, expression_set
 
 TEXTURES = ROOT.parent / "shared" / "data" / "textures"
 FACES = "unrelated-faces-512"
-PARTS = ("quality", "search", "seams", "examples", "time", "published")
+PARTS = ("quality", "search", "seams", "priority", "examples", "time", "published")
 # strength and noise of the generated sets; the last has as much noise as signal
 GENERATED = ((14, 0), (14, 2), (8, 1), (30, 2), (14, 5))
 SEARCH_BAR, BOUND_PASSES = 0.75, 200
 SECONDS = {512: 3, 1024: 8, 2048: 30, 4096: 150}
-PAPER_SEARCH_BAR, BOUND_PASSES = 0.75, 200
-SECONDS = {512: 1102, 1024: 3794, 2048: 16216}
+PAPER_SECONDS = {512: 1102, 1024: 3794, 2048: 16216}
 
 
 def read_set(folder):
@@ -159,6 +160,7 @@ def search(sets, verdict):
         else:
             what = f"search / bound (no state is below {triples:.3f} of the best restart)"
             verdict.check(name, what, reached / triples, 1.08)
+            verdict.check(name, "bound / search", triples * best / min(found), 1.0)
         verdict.check(name, "two seeds differ by", max(found) / min(found) - 1, 0.01)
         rows.append([name, curves["masks"], *(x / best for x in found), pairs, triples, SEARCH_BAR, curves["seconds"]])
     header = ["set", "masks", "seed 0", "seed 1", "bound by pairs", "bound by triples", "bar", "seconds"]
@@ -215,6 +217,48 @@ def border_ratios(textures, packed, blends=30, seed=0):
 
 def _edges(height, width):
     return np.arange(1, width)[None], np.arange(1, height)[:, None]
+
+
+def priority(sets, verdict):
+    """What --priority changes in a tenth of the face, beside what any solution of this form could give it.
+
+    alone: nothing but the region counts, ten times the passes. B4 is of the region alone.
+    """
+    rows = []
+    for name, textures, _ in sets:
+        if name not in (FACES, "generated 14/2"):
+            continue
+        region = tenth(textures.covered)
+        weight = np.where(region, 10.0, 1.0)
+        runs = {
+            "plain": facezip(textures.neutral, textures.textures, covered=textures.covered),
+            "priority": facezip(textures.neutral, textures.textures, covered=textures.covered, priority=weight),
+            "alone": facezip(
+                textures.neutral, textures.textures, covered=region, options=FacezipOptions(iterations=150)
+            ),
+        }
+        inside = {run: part_rmse(packed, textures, region) for run, packed in runs.items()}
+        outside = {run: part_rmse(runs[run], textures, textures.covered & ~region) for run in ("plain", "priority")}
+        bound = block_bound(replace(textures, covered=region)).mean()
+        rows.append([name, *inside.values(), bound, *outside.values()])
+        verdict.check(name, "region, priority / plain", inside["priority"] / inside["plain"], 1.0)
+        verdict.check(name, "rest, priority / plain", outside["priority"] / outside["plain"], 1.05)
+    header = ["set", "region, plain", "priority", "alone", "B4", "rest, plain", "priority"]
+    print_table("Priority of a tenth of the face (white: ten times)", header, rows)
+
+
+def tenth(covered):
+    """(h, w) bool: the tenth of the covered texels nearest to the eyes and the bridge of the nose."""
+    y, x = np.mgrid[: covered.shape[0], : covered.shape[1]]
+    away = np.hypot(x / covered.shape[1] - 0.5, 1.6 * (y / covered.shape[0] - 0.4))
+    return covered & (away <= np.quantile(away[covered], 0.1))
+
+
+def part_rmse(packed, textures, part):
+    """Mean over textures of the RMSE in a part (h, w) bool."""
+    d = packed.difference_textures()
+    images = enumerate(textures.textures)
+    return np.mean([rms_error(decode_one(packed, n, d), image.astype(np.float32), part) for n, image in images])
 
 
 def examples(sets, verdict):
@@ -319,12 +363,12 @@ def main():
     folders = options.set if options.set is not None else sorted(TEXTURES.glob("*/")) if TEXTURES.is_dir() else []
     verdict = Verdict()
     sets = [(folder.name, read_set(folder), np.inf) for folder in folders] + list(generated_sets())
-    if "search" in parts:
-        search(sets + list(small_sets()), verdict)
-    run = {"seams": seams, "examples": examples}
+    run = {"seams": seams, "priority": priority, "examples": examples}
     if "quality" in parts:
         more = [each for name, textures, _ in sets if name == FACES for each in face_sets(name, textures)]
         quality(sets + more, verdict)
+    if "search" in parts:
+        search(sets + list(small_sets()), verdict)
     for part in parts:
         if part in run:
             run[part](sets, verdict)

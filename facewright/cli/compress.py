@@ -30,7 +30,11 @@ def add_arguments(parser):
     )
     parser.add_argument("--region", metavar="IMAGE", help="where --method paper samples its masks")
     parser.add_argument("--keep", action="append", default=[], metavar="NAME", help="store this texture exactly")
-    parser.add_argument("--priority", metavar="IMAGE", help="grey image: where errors count up to ten times (white): helps lines finer than 8 texels, hardly whole regions")
+    parser.add_argument(
+        "--priority",
+        metavar="IMAGE",
+        help="grey image: white counts ten times as much as black; helps fine lines (3 texels), hardly whole regions",
+    )
     parser.add_argument(
         "--examples", metavar="CSV", help="weights of example-based shapes: rows textures, columns shapes"
     )
@@ -162,14 +166,16 @@ def print_summary(packed, about, reader, examples, results):
     size = about["bytes"]
     count = len(next(iter(packed.values())).names)
     raw = sum(one.neutral.nbytes * (count + 1) for one in packed.values()) / 1e6
-    print(f"{counted(count, 'texture')}: {size['memory'] / 1e6:.2f} MB in memory, {size['png'] / 1e6:.2f} as PNG, raw {raw:.1f}")
+    sizes = f"{size['memory'] / 1e6:.2f} MB in memory, {size['png'] / 1e6:.2f} as PNG, raw {raw:.1f}"
+    print(f"{counted(count, 'texture')}: {sizes}")
     if "ktx2" in size:
         print(f"KTX2 with mip-maps: {size['ktx2'] / 1e6:.2f} MB on disk, {size['memory_ktx2'] / 1e6:.2f} in GPU memory")
     for name, one in packed.items():
         rmse, report = one.report["rmse"], one.report
         worst = max(rmse, key=rmse.__getitem__)
         reading, whole = report["seconds"]["reading"], sum(report["seconds"].values())
-        print(f"{name}: {counted(len(one.textures), 'difference texture')}, {whole - reading:.1f} s, reading {reading:.1f} s")
+        stored = counted(len(one.textures), "difference texture")
+        print(f"{name}: {stored}, {whole - reading:.1f} s, reading {reading:.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
         if report["solution"] == "exact":
             step = one.texture_step[(one.textures != one.texture_zero[:, None, None]).any(axis=(1, 2))].max(initial=0)

@@ -69,7 +69,11 @@ float4 FacezipWeights(int2 cell) {
 
 // Pass 2, in the material: reads at most six textures.
 float4 Facezip(float2 uv) {
-  float4 w = facezipSum.Sample(facezipLinearClamp, uv * facezipUvScale);
+  float2 at = uv * facezipUvScale;
+#ifdef FACEZIP_UPWARDS                       // rows and v count from below (Unity)
+  at.y += 1.0 - facezipUvScale.y;
+#endif
+  float4 w = facezipSum.Sample(facezipLinearClamp, at);
   float4 d = w.x * facezipStep[0] * (facezipD0.Sample(facezipLinearClamp, uv) - facezipZero[0]);
   d += w.y * facezipStep[1] * (facezipD1.Sample(facezipLinearClamp, uv) - facezipZero[1]);
   d += w.z * facezipStep[2] * (facezipD2.Sample(facezipLinearClamp, uv) - facezipZero[2]);

@@ -209,7 +209,12 @@ def test_tables_that_say_too_little_are_refused(tmp_path, command, capsys, rows,
 
 @pytest.mark.parametrize(
     "weights,wanted",
-    [("smile=0.5, jaw=1", {"smile": 0.5, "jaw": 1}), ("a,b=1,c=d=-2", {"a,b": 1, "c=d": -2}), ("x, y=1 , z=2,", {"x, y": 1, "z": 2}), ("", {})],
+    [
+        ("smile=0.5, jaw=1", {"smile": 0.5, "jaw": 1}),
+        ("a,b=1,c=d=-2", {"a,b": 1, "c=d": -2}),
+        ("x, y=1 , z=2,", {"x, y": 1, "z": 2}),
+        ("", {}),
+    ],
 )
 def test_weights(weights, wanted):
     assert parse_weights(weights) == wanted

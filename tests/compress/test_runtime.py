@@ -13,6 +13,7 @@ RECIPES = Path(__file__).resolve().parents[2] / "docs" / "compress-engines.md"
 COMPILER = shutil.which("glslangValidator")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no glslangValidator (Debian: glslang-tools)")
 
+INCLUDE = "#extension GL_GOOGLE_include_directive : enable\n#include"  # glslang asks for it
 UNREAL_TYPES = {"Offset": "float4", "Across": "float", "Count": "float", "WeightSize": "float2", "UV": "float2"}
 UNREAL_TYPES |= {"UvScale": "float2"} | {f"{name}{i}": "float4" for name in ("Step", "Zero") for i in range(4)}
 
@@ -71,19 +72,21 @@ def test_hlsl_compiles(tmp_path, call):
 @pytest.mark.parametrize("entry,stage", [("vertex", "vert"), ("fragment", "frag")])
 def test_the_first_pass_for_unity_compiles(tmp_path, entry, stage):
     program = recipe("Unity", 0).split("HLSLPROGRAM")[1].split("ENDHLSL")[0]
-    program = re.sub(r"#pragma.*", "", program).replace("#include", "#extension GL_GOOGLE_include_directive : enable\n#include")
+    program = re.sub(r"#pragma.*", "", program).replace("#include", INCLUDE)
     passed(compile_hlsl(tmp_path, program, entry, stage))
 
 
 @pytest.mark.parametrize("kind", ["float", "half"])
 def test_the_custom_function_for_unity_compiles(tmp_path, kind):
-    program = recipe("Unity", 1).replace("#include", "#extension GL_GOOGLE_include_directive : enable\n#include")
+    program = recipe("Unity", 1).replace("#include", INCLUDE)
     body = f"{kind}4 color; FacezipColor_{kind}({kind}2(uv), color); return float4(color);"
     program += f"float4 main(float2 uv : TEXCOORD0) : SV_Target {{ {body} }}"
     passed(compile_hlsl(tmp_path, program, "main"))
 
 
-@pytest.mark.parametrize("number,kind,textures", [(0, "float3", "Atlas Gains"), (1, "float4", "Neutral D0 D1 D2 D3 Sum")])
+@pytest.mark.parametrize(
+    "number,kind,textures", [(0, "float3", "Atlas Gains"), (1, "float4", "Neutral D0 D1 D2 D3 Sum")]
+)
 def test_custom_nodes_for_unreal_compile(tmp_path, number, kind, textures):
     code = recipe("Unreal", number)
     inputs = [f"{UNREAL_TYPES[name]} {name}" for name in UNREAL_TYPES if re.search(rf"\b{name}\b", code)]
