@@ -109,6 +109,9 @@ def test_evaluate_compression(tmp_path, command, capsys):
     tables = {"table.csv", "expressions.csv", "masks.csv", "restarts.csv", "figures.json"}
     plots = {"errors.png", "permutation.png", "masks.png", "worst.png", "median.png"}
     assert {path.name for path in out.iterdir()} == tables | plots
+    assert (
+        len((out / "masks.csv").read_text().splitlines()) == 2
+    )  # four vertices hold four masks, however many are asked
     assert main(["evaluate", "compression", command[1]]) == 2
     assert "give --neutral IMAGE and --mesh OBJ" in capsys.readouterr().err
 

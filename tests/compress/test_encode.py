@@ -123,6 +123,21 @@ def test_a_region_of_priority_is_met_better():
     assert top(urgent) < 0.97 * top(plain)
 
 
+def test_fine_lines_gain_most_by_priority_and_what_lies_beside_them_loses_little():
+    made = expression_set(192, 14, strength=30, noise=0)
+    lines = made.covered & (np.arange(192) % 24 < 3)[:, None]
+    priority = np.where(lines, 10.0, 1.0)
+    plain, urgent = (facezip(made.neutral, made.textures, covered=made.covered, priority=p) for p in (None, priority))
+
+    def error(packed, part):
+        decoded = [facezip_decode(packed, np.eye(14)[n]) for n in range(14)]
+        return np.mean([rmse(image[part], texture[part]) for image, texture in zip(decoded, made.textures)])
+
+    beside = made.covered & ~lines
+    assert error(urgent, lines) < 0.85 * error(plain, lines)
+    assert error(urgent, beside) < 1.2 * error(plain, beside)
+
+
 def test_masks_are_sampled_in_the_region():
     made = expression_set(64, 6)
     region = np.zeros((64, 64), bool)
