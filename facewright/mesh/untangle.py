@@ -4,7 +4,10 @@ import numpy as np
 
 from facewright.mesh.adjacency import dilate, vertex_adjacency
 from facewright.mesh.intersect import intersections_of, self_intersections
+from facewright.mesh.laplacian import uniform_laplacian
 from facewright.mesh.normals import face_cross, normalized
+from facewright.solve.procrustes import best_similarity
+from facewright.solve.quadratic import Factorization
 
 
 def untangled(vertices, faces, keep, *, rounds=60):
@@ -50,3 +53,19 @@ def unfolded(vertices, faces, expected, keep, *, limit=0.2, rounds=40):
             break
         moved[loose] = 0.5 * moved[loose] + 0.5 * ((A @ moved) / degree)[loose]
     return moved
+
+
+def reshaped(vertices, reference, faces, free):
+    """Vertices (n, 3) of which the free (n,) bool take the shape that a reference (n, 3) has there.
+
+    The reference is laid on the free vertices by a similarity; what it is off at their rim is spread over them as
+    evenly as second differences allow.
+    """
+    around = dilate(free, faces, 2)
+    R, scale, t = best_similarity(reference[around], vertices[around], np.ones(around.sum()))
+    laid = scale * reference @ R.T + t
+    offset = np.where(free[:, None], 0.0, vertices - laid)
+    L = uniform_laplacian(faces[around[faces].any(axis=1)], len(vertices)).tocsr()
+    bending = (L.T @ L).tocsr()[free]
+    offset[free] = Factorization(bending[:, free]).solve(-(bending[:, ~free] @ offset[~free]))
+    return laid + offset

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.adjacency import border_vertices, vertex_adjacency
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_areas, face_normals, vertex_normals
+
+SMOOTH_MM, MAX_ROUNDS = 4.6, 20
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,16 @@ def roughness_deg(vertices, faces, radius_mm=9.0, count=40000, neighbours=40):
     return np.where(near.sum(axis=1) >= 4, np.degrees(np.arccos(np.clip(length, 0.0, 1.0))), 0.0)
 
 
+def _low_pass(vertices, faces, rounds):
+    """Vertices (n, 3) after rounds of shrinking and growing, which leave coarse forms as they are (Taubin 1995)."""
+    adjacency = vertex_adjacency(faces, len(vertices))
+    mean = sp.diags(1.0 / np.maximum(np.asarray(adjacency.sum(axis=1)).ravel(), 1.0)) @ adjacency
+    for _ in range(rounds):
+        for step in (0.5, -0.53):
+            vertices = vertices + step * (mean @ vertices - vertices)
+    return vertices
+
+
 class Target:
     """A scan prepared for matching: nearest points, smooth normals, border, and what a camera outside can see.
 
@@ -62,6 +76,18 @@ class Target:
         skin = self.surface.closest(skin_points)
         typical = np.median(interpolate(degrees, self.faces, skin.faces, skin.barycentric))
         self.roughness = degrees / max(float(typical), 3.0)
+
+    def smoothed(self, edge_mm):
+        """The same Target without the scanner's noise: what is finer than about SMOOTH_MM is gone, the rest stays.
+
+        edge_mm: how long the scan's edges are; a coarse scan has no such noise, and is left as it is
+        """
+        rounds = min(MAX_ROUNDS, round((SMOOTH_MM / max(edge_mm, 1e-6)) ** 2))
+        smooth = copy(self)
+        smooth.vertices = _low_pass(self.vertices, self.faces, rounds)
+        smooth.surface = Surface(smooth.vertices, self.faces)
+        smooth.normals = vertex_normals(smooth.vertices, self.faces)
+        return smooth
 
     def match(self, points, normals, *, max_distance, max_angle_deg=60.0, tau=None):
         """Matches of template points (k, 3) with outward normals (k, 3).

@@ -33,8 +33,9 @@ class EarOptions:
     points     of the scan that are asked
     blend_mm   over which the head around follows
     fits_mm    an ear this near to the scan's stays
-    better, left_mm, covered  an ear is believed whose distance from the scan's falls to this share and to this mean,
-               and of which the scan shows this share
+    better, left_mm, covered  an ear is believed whose distances from the scan's, both ways, fall to this share and to
+               this mean, and of which the scan shows this share: hair beside an ear that fits stands out of the head
+               too, and would lead it away
     """
 
     out_mm: tuple[float, float] = (4.0, 6.0)
@@ -114,7 +115,9 @@ class _Ear:
         best = min((self._settled(start) for start in (stays, self._by_outline())), key=self._distance)
         pairs = self._pairs(best)
         believed = pairs.mean_mm < self.options.left_mm and pairs.covered > self.options.covered
-        return best if believed and self._distance(best) < self.options.better * now else None
+        better = self.options.better
+        nearer = self._distance(best) < better * now and self._own_distance(best) < better * self._own_distance(stays)
+        return best if believed and nearer else None
 
     def _by_outline(self):
         """What stands out of the head laid on what stands out of the scan, by centre and spread."""
@@ -148,9 +151,20 @@ class _Ear:
         found = Surface(self._placed(similarity), self.patch).closest(self.target.vertices[self.near])
         return self.there @ np.minimum(found.distance, self.options.far_mm) / self.there.sum()
 
-    def _pairs(self, similarity):
+    def _own_distance(self, similarity):
+        """Mean distance of what stands out of the head from scan that looks the same way, mm; far_mm without any."""
+        _, _, match = self._matched(similarity)
+        distance = np.where(match.weights > 0, match.distance, self.options.far_mm)
+        return self.own @ np.minimum(distance, self.options.far_mm) / self.own.sum()
+
+    def _matched(self, similarity):
         options, moved, normals = self.options, self._placed(similarity), self.normals @ similarity[0].T
         match = self.target.match(moved, normals, max_distance=options.far_mm, max_angle_deg=options.angle_deg)
+        return moved, normals, match
+
+    def _pairs(self, similarity):
+        options = self.options
+        moved, normals, match = self._matched(similarity)
         found = Surface(moved, self.patch).closest(self.target.vertices[self.near])
         own = interpolate(normals, self.patch, found.faces, found.barycentric)
         alike = (own * self.target.normals[self.near]).sum(axis=1) > np.cos(np.radians(options.angle_deg))

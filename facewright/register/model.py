@@ -15,19 +15,26 @@ from scipy.spatial.transform import Rotation
 from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import vertex_normals
 
+SAMPLES = 3000
+
 
 @dataclass(frozen=True)
 class ModelOptions:
     """sigma_mm: what the identity modes cannot explain; n_effective: independent observations that the scan counts as.
 
-    iterations of the surface stage; landmark_sigma_mm: how well a landmark is placed; landmark_floor: the share
+    iterations of the surface stage, the first with coarse_modes, the last fine_iterations with all modes, fine_sigma_mm
+    and fine_n_effective; landmark_sigma_mm: how well a landmark is placed; landmark_floor: the share
     of their pull that landmarks keep to the end (0.05, 0.3 and 1 tried: lips of ICT heads 2.1, 1.6, 1.1 mm, but the
     face of hm08 heads 0.85, 0.90, 0.99)
     """
 
     sigma_mm: float = 0.7
     n_effective: float = 100.0
+    fine_sigma_mm: float = 0.5
+    fine_n_effective: float = 300.0
     iterations: int = 20
+    fine_iterations: int = 6
+    coarse_modes: int = 150
     landmark_sigma_mm: float = 2.0
     landmark_floor: float = 0.2
 
@@ -36,7 +43,7 @@ class ModelOptions:
 class ModelFit:
     """vertices (n, 3) and the same at rest (n, 3); alpha (i,) identity in standard deviations; expression (e,).
 
-    T (4, 4) similarity, rms mm
+    T (4, 4) similarity, rms mm. A refined fit (refine.py) has new vertices and rest; alpha, T and rms are the model's.
     """
 
     vertices: np.ndarray
@@ -65,17 +72,24 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     returns ModelFit
     """
     landmark_points, landmark_rows, landmark_weights = landmarks
-    state = _State(mean, basis, expressions)
+    coarse = basis.first(options.coarse_modes)
+    state = _State(mean, coarse, expressions)
     deltas = expressions.deltas
     sampled = _sample_rows(mean, faces, weights)
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
-    areas *= options.n_effective / areas.sum()
-    landmark_model = _project(landmark_rows, mean, basis, deltas)
-    linear = np.concatenate([basis.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
+    areas /= areas.sum()
+    information = options.n_effective / options.sigma_mm**2
+    landmark_model = _project(landmark_rows, mean, coarse, deltas)
+    linear = np.concatenate([coarse.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
     for _ in range(8):
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
     for iteration in range(options.iterations):
+        if iteration == options.iterations - options.fine_iterations:
+            state.refine(basis)
+            information = options.fine_n_effective / options.fine_sigma_mm**2
+            landmark_model = _project(landmark_rows, mean, basis, deltas)
+            linear = np.concatenate([basis.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()
         progress = iteration / max(1, options.iterations - 1)
         vertices = state.vertices()
         normals = vertex_normals(vertices, faces)
@@ -87,7 +101,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
         # Heights mean little while the model is still far off.
         height = height if progress > 0.5 else np.zeros_like(height)
         belief = matches.weights * rules.believe(sampled[:, None], height, matches.roughness)
-        surface = (rows, residuals, areas * belief / options.sigma_mm**2)
+        surface = (rows, residuals, information * areas * belief)
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         fading = (1 - progress) ** 2 + options.landmark_floor
         landmarks = (rows, residuals, fading * row_weights / options.landmark_sigma_mm**2)
@@ -99,7 +113,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     return ModelFit(vertices, rest, state.alpha, state.expression, state.T(), rms)
 
 
-def _sample_rows(mean, faces, weights, count=5000):
+def _sample_rows(mean, faces, weights, count=SAMPLES):
     """Trusted vertices, thinned evenly to about count."""
     rows = np.flatnonzero(weights > 0)
     return rows[:: max(1, len(rows) // count)]
@@ -136,6 +150,11 @@ class _State:
         self.alpha = np.zeros(len(basis))
         self.expression = expressions.expected.astype(float).copy()
         self.R, self.s, self.t = np.eye(3), 1.0, np.zeros(3)
+
+    def refine(self, basis):
+        """Go on with more modes, of which the present ones are the first."""
+        self.alpha = np.concatenate([self.alpha, np.zeros(len(basis) - len(self.alpha))])
+        self.basis = basis
 
     def T(self):
         T = np.eye(4)

@@ -5,12 +5,12 @@ Minimises over the displacement d of the model's vertices x
     sum_i w_i (n_i . (x_i + d_i - p_i))^2            template to scan, point to plane
   + sum_j w_j (n_j . (B_j (x + d) - q_j))^2          scan to template, so that no hollow is skipped
   + sum_l w_l |C_l (x + d) - c_l|^2                  feature lines (lip seam, lid lines)
-  + w_bend |M^-1/2 L d|^2 + w_stretch d' L d + w_hold |d|^2
+  + w_bend |M^-1/2 L d|^2 + w_stretch d' L d + sum_i h_i |d_i|^2
 
-with L the cotangent Laplacian of the model fit and M its lumped mass. d is measured from the model fit at every level,
-so that stiffness falls without the mesh forgetting the model. The data terms couple x, y and z, so the system is
-solved by conjugate gradients, preconditioned with a Cholesky factor of the n x n part that the axes share: a factor of
-the full 3n system costs eight times as much and its solution is the same.
+with L the cotangent Laplacian of the model fit, M its lumped mass, and h the hold times the mass. d is measured from
+the model fit at every level, so that stiffness falls without the mesh forgetting the model. The data terms couple x, y
+and z, so the system is solved by conjugate gradients, preconditioned with a Cholesky factor of the n x n part that the
+axes share: a factor of the full 3n system costs eight times as much and its solution is the same.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ class ElasticSkin:
         self.mass = mass
 
     def solve(self, rows, w_bend, w_stretch, w_hold, start=None, tolerance=1e-3, max_iterations=40):
-        """The displacement (n, 3) for a tuple of Rows."""
+        """The displacement (n, 3) for a tuple of Rows; w_hold: a number or (n,)."""
         n = len(self.vertices)
-        shared = w_bend * self.bending + w_stretch * self.stretching + w_hold * sp.diags(self.mass)
+        shared = w_bend * self.bending + w_stretch * self.stretching + sp.diags(w_hold * self.mass)
         A, b, diagonal = _data_terms(rows, self.vertices)
         preconditioner = Factorization(shared + diagonal + 1e-9 * sp.eye(n))
         x = np.zeros((n, 3)) if start is None else start.copy()

@@ -11,7 +11,7 @@ from facewright.mesh.adjacency import dilate
 from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
-from facewright.mesh.untangle import unfolded, untangled
+from facewright.mesh.untangle import reshaped, unfolded, untangled
 from facewright.register.correspond import Target
 from facewright.register.ears import ear_motion
 from facewright.register.interior import tuck_interior
@@ -20,6 +20,7 @@ from facewright.register.localize import localized_basis
 from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
 from facewright.register.pairs import eyes_closed, landmark_errors, landmark_pairs
+from facewright.register.refine import refine_model
 from facewright.register.skin import fit_skin, skin_rules, without_hair
 from facewright.scan.pose import face_edge_mm
 
@@ -31,9 +32,10 @@ SIDES = {"left": "Left", "right": "Right"}
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
 # Rings of vertices around a knot in which everything gives way, tried in turn.
-GIVING_WAY = (0, 1, 2, 3)
+GIVING_WAY, RESHAPED = (0, 1, 2, 3), (2, 3, 4, 5)
 FOLD_MM = 3.0  # a face is only held to look as the scan does where the scan is this near
 PLAINLY_OPEN = 0.4  # several times what matters (Target.MIN_OPENNESS)
+LED_LINES = ("lip_seam", "lid_")
 KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
@@ -69,13 +71,14 @@ def register(scan, landmarks, template, options=None, placed=()):
     target.compare_roughness(landmarks.positions(scan.vertices, scan.faces)[smooth])
     pairs = landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
-    model, names = _fit_model(template, target, pairs, closed, options.model)
+    edge_mm = face_edge_mm(scan.vertices, scan.faces)
+    model, names = _fit_model(template, target.smoothed(edge_mm), pairs, closed, options.model)
     model = _with_ears(template, target, model)
     leading, line_stats = leading_lines(scan, template, model, pairs, closed)
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
-    levels = LEVELS if face_edge_mm(scan.vertices, scan.faces) > FACETS_MM else LEVELS + DETAIL
+    levels = LEVELS if edge_mm > FACETS_MM else LEVELS + DETAIL
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
     interior, outer, led = _interior(template)
     skin = _unfolded(template, skin, faces, matches)
@@ -139,21 +142,13 @@ def _fit_model(template, target, pairs, closed, options):
     ears = template.regions["ear_left"] | template.regions["ear_right"]
     trust[~template.regions["face"] & ~ears] *= 0.3
     trust[template.regions["scalp"]] = 0.0  # it may be hair
-    basis = localized_basis(
-        template.vertices, template.identity_basis, template.regions["face"], template.regions["outer"]
-    )
-    model = fit_model(
-        template.vertices,
-        basis,
-        expressions,
-        template.faces[template.skin.face_slice],
-        trust,
-        rules,
-        target,
-        (pairs.points, pairs.rows, pairs.weights),
-        options,
-    )
-    return model, names
+    faces = template.faces[template.skin.face_slice]
+    common = (faces, trust, rules, target)
+    landmarks = (pairs.points, pairs.rows, pairs.weights)
+    mean, basis = template.vertices, template.identity_basis
+    local = localized_basis(mean, basis, template.regions["face"], template.regions["outer"])
+    model = fit_model(mean, local, expressions, *common, landmarks, options)
+    return refine_model(model, mean, basis, *common), names
 
 
 def _with_ears(template, target, model):
@@ -168,17 +163,21 @@ def _with_ears(template, target, model):
 def _unfolded(template, skin, faces, matches):
     """Skin (n, 3) without faces of the lips that look away from the scan, as in the groove at a corner."""
     n = len(skin)
-    asked = (template.regions["lips"] & template.regions["outer"])[:n] & (matches.distance < FOLD_MM)
+    grooves = (template.regions["lips"] | template.regions["eyes"]) & template.regions["outer"]
+    asked = grooves[:n] & (matches.distance < FOLD_MM)
     expected = normalized(matches.normals[faces].sum(axis=1)) * asked[faces].all(axis=1)[:, None]
     keep = np.zeros(n, bool)
-    keep[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
+    for name, line in template.lines.items():
+        if name.startswith(LED_LINES):
+            keep[line] = True
     return unfolded(skin, faces, expected, keep)
 
 
 def _without_knots(template, skin, faces):
     """Skin (n, 3) with the knots of lips and lids smoothed away.
 
-    The lip seam and the skin beside them hold; what lies around a knot gives way only where it does not come loose.
+    The lip seam and the skin beside them hold; what lies around a knot gives way only where it does not come loose, and
+    what smoothing does not loosen takes the template's shape.
     """
     n = len(skin)
     knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
@@ -198,6 +197,16 @@ def _without_knots(template, skin, faces):
         if not len(left):
             break
         tried = _closed_as(skin, untangled(skin, faces, (~knotty | seam) & ~dilate(knot, faces, rings)), template)
+        remaining = crossing(tried)
+        if len(remaining) < len(left):
+            best, left = tried, remaining
+    for rings in RESHAPED:
+        if not len(left):
+            break
+        knot[:] = False
+        knot[faces[left].ravel()] = True
+        shape = reshaped(best, template.vertices[:n], faces, dilate(knot, faces, rings) & knotty)
+        tried = _closed_as(skin, shape, template)
         remaining = crossing(tried)
         if len(remaining) < len(left):
             best, left = tried, remaining
@@ -226,5 +235,5 @@ def _interior(template):
     stop = template.skin.vertices[1]
     names = ("mouth_interior", "socket_left", "socket_right", "nostrils")
     outer = template.regions["outer"][:stop]
-    led = np.concatenate([line for name, line in template.lines.items() if name.startswith(("lip_seam", "lid_"))])
+    led = np.concatenate([line for name, line in template.lines.items() if name.startswith(LED_LINES)])
     return np.any([template.regions[name][:stop] for name in names], axis=0) & ~outer, outer, led

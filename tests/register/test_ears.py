@@ -42,3 +42,17 @@ def test_ears_that_fit_and_ears_that_are_hidden_stay(head):
     for ear in ears:
         bare = _without_ear(bare, F, np.flatnonzero(ear)).vertices
     assert not ear_motion(V, F, ears, Target(bare, F)).any()
+
+
+def test_hair_beside_an_ear_that_fits_does_not_lead_it_away(head, ball_scan):
+    """A tuft as large as an ear, standing out beside it."""
+    V, F, ears = head
+    tufts, faces = V.copy(), [F]
+    for ear, sign in zip(ears, (1.0, -1.0)):
+        tuft = ball_scan(None, k=12, radius=18.0)
+        faces.append(tuft.faces + len(tufts))
+        tufts = np.concatenate(
+            [tufts, tuft.vertices * [0.5, 1.4, 1.0] + V[ear].mean(axis=0) + [sign * 4.0, 24.0, -14.0]]
+        )
+    target = Target(tufts, np.concatenate(faces))
+    assert not ear_motion(V, F, ears, target).any()

@@ -1,0 +1,27 @@
+"""The skin drawn to a scan: it takes up what the model lacks, and does not slide."""
+
+import numpy as np
+
+from facewright.mesh.normals import vertex_normals
+from facewright.register.correspond import Target
+from facewright.register.register import LEVELS
+from facewright.register.skin import fit_skin, skin_rules
+
+
+def test_what_the_model_lacks_is_taken_up_along_the_normal(hm08):
+    """A scan of the model's own head with a swelling and noise: the skin follows it, its points stay below theirs."""
+    n = hm08.skin.vertices[1]
+    model, faces = hm08.vertices[:n], hm08.faces[hm08.skin.face_slice]
+    normals = vertex_normals(model, faces)
+    cheek = model[hm08.regions["face"][:n] & (model[:, 0] > 35) & (model[:, 1] < -30)].mean(axis=0)
+    swelling = 1.5 * np.exp(-((model - cheek) ** 2).sum(axis=1) / 15.0**2)
+    noise = np.random.default_rng(0).normal(0.0, 0.1, n)
+    truth = model + swelling[:, None] * normals
+    fitted, _ = fit_skin(model, faces, Target(truth + noise[:, None] * normals, faces), skin_rules(hm08), (), LEVELS)
+    face = hm08.regions["face"][:n] & hm08.regions["outer"][:n]
+    off = fitted - truth
+    height = np.einsum("nc,nc->n", off, normals)
+    slid = np.linalg.norm(off - height[:, None] * normals, axis=1)
+    assert np.abs(height)[face].mean() < 0.06
+    assert slid[face].mean() < 0.06
+    assert slid[face & (swelling > 0.5)].mean() < 0.25
