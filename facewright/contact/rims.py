@@ -1,0 +1,66 @@
+"""The rims of shut lids lie on each other: round as they are, they would pass through each other where their margins meet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facewright.mesh.seam import seam_sides
+
+_REACH_MM = 8.0  # over the skin from the margins: what the other lid may meet
+_GAP_MM = 0.1  # left between two rims
+_DEEPEST_MM = 4.0
+_ROUNDS = 3
+
+
+class LidRims:
+    """The outer skin of the two lids of one eye, next to their margins.
+
+    vertices (n, 3) mm at rest, faces (m, 3) of the outer skin; upper, lower: margin vertices from canthus to canthus
+    """
+
+    def __init__(self, vertices, faces, upper, lower):
+        sides = seam_sides(vertices, faces, upper, lower, _REACH_MM)
+        self.sides = [np.flatnonzero(side) for side in sides]
+        patches = []
+        for side, line in zip(sides, (upper, lower)):
+            mine = side.copy()
+            mine[line] = True
+            patches.append(faces[mine[faces].all(axis=1)])
+        self.patches = patches
+
+    def turns(self, along, radius, angle):
+        """(n,) radians by which vertices turn about the eye's axis so that no rim lies in the other one.
+
+        along, radius (n,) mm along the axis and from it; angle (n,) radians about it, growing upwards. Both lids give
+        way half and half, to the surface midway between them, which passes through the line where they meet in front:
+        so nothing moves that is seen.
+        """
+        place, turned = np.stack([along, radius], axis=1), np.array(angle)
+        for _ in range(_ROUNDS):
+            over = []
+            for mine, patch, sign in zip(self.sides, self.patches[::-1], (1.0, -1.0)):
+                other = sign * _highest(place[mine], place, sign * turned, patch)
+                depth = sign * (other - turned[mine]) + _GAP_MM / radius[mine]
+                deep = (depth > 0.0) & (depth < _DEEPEST_MM / radius[mine])
+                over.append(np.where(deep, 0.5 * sign * depth, 0.0))
+            for mine, turn in zip(self.sides, over):
+                turned[mine] += turn
+        return turned - angle
+
+
+def _highest(points, place, height, faces):
+    """(k,) greatest height of the faces over points (k, 2); -inf where none lies.
+
+    place (n, 2), height (n,) of vertices; faces (m, 3)
+    """
+    a, b, c = (place[faces[:, i]] for i in range(3))
+    e, f = b - a, c - a
+    area = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
+    area = np.where(np.abs(area) < 1e-12, np.inf, area)
+    to = points[:, None] - a
+    second = (to[..., 0] * f[:, 1] - to[..., 1] * f[:, 0]) / area
+    third = (e[:, 0] * to[..., 1] - e[:, 1] * to[..., 0]) / area
+    inside = (second >= 0.0) & (third >= 0.0) & (second + third <= 1.0) & np.isfinite(area)
+    first, h = 1.0 - second - third, height[faces]
+    found = first * h[:, 0] + second * h[:, 1] + third * h[:, 2]
+    return np.where(inside, found, -np.inf).max(axis=1, initial=-np.inf)
