@@ -15,6 +15,7 @@ from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
 
 _LIPS_MM, _LIDS_MM = 30.0, 10.0  # from their lines: skin that may come to cross
+_TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
 _FAR_MM = 20.0  # what moves farther may cross elsewhere, as chin and neck do
 
 
@@ -73,14 +74,14 @@ class _Crossings:
     def with_pairs(self, targets, run):
         """Targets whose named pairs have none."""
         extras = dict(targets.extras)
-        pairs = [(pair, window) for pairs, window in ((EYE_PAIRS, self.is_left), (MOUTH_PAIRS, self.left)) for pair in pairs]
-        correctives = [_of_pair(pair, targets) for pair, _ in pairs]
+        windows = [(EYE_PAIRS, self.is_left), ((*MOUTH_PAIRS, _TONGUE), self.left)]
+        pairs = [(_of_pair(pair, targets), window) for pairs, window in windows for pair in pairs]
 
         def field(names):
             drivers = {driver for name in names for driver in targets.correctives[name]}
             return self._apart([targets.motion(dict.fromkeys(sorted(drivers), 1.0))], [1.0])
 
-        asked = [(names, window) for names, (_, window) in zip(correctives, pairs) if names]
+        asked = [(names, window) for names, window in pairs if names]
         for (names, window), change in zip(asked, run(field, [names for names, _ in asked])):
             shares = (window, 1.0 - window) if len(names) > 1 else (1.0,)
             for name, share in zip(names, shares):

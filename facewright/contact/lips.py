@@ -20,6 +20,7 @@ from facewright.contact.teeth import Teeth
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.spread import SoftSpread
@@ -48,6 +49,7 @@ class LipOptions:
     near_mm: float = 20.0
     smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 9
     reach_mm: float = 4.0
+    tie_mm: float = 1.0
     touch_mm: float = 0.15
     gap_mm: float = 0.05
     rest_mm: float = 0.1
@@ -93,7 +95,8 @@ class LipContact:
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
-        self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm)
+        ties = self._ties(rest, outer[self.used]) if self.options.tie_mm else None
+        self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm, ties=ties)
         self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used])
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
@@ -104,6 +107,15 @@ class LipContact:
         lips = [Watch(rest[mine], rest[other]) for mine, other in zip(self.sides, self.sides[::-1])]
         teeth = [Watch(rest[self._guarded], vertices[at]) for at, _ in self.teeth]
         self._at_rest = self._wishes(rest, vertices, _Watches(tuple(lips), tuple(teeth)))[2]
+
+    def _ties(self, rest, outer):
+        """Ties of SoftSpread: lining moves with the skin of its lip that it lies behind."""
+        mass, found = lumped_mass(rest, self.faces), []
+        for side in self.sides:
+            lining, skin = side[~outer[side]], side[outer[side]]
+            found.append((lining, skin[cKDTree(rest[skin]).query(rest[lining])[1]]))
+        lining, skin = map(np.concatenate, zip(*found))
+        return lining, skin, mass[lining] / self.options.tie_mm**4
 
     def shut(self, motion, weights=None, acts=None, lifted=False):
         """(n, 3) correction of a motion so that no slit is open between the lips where the correction acts most.
