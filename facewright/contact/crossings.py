@@ -43,7 +43,8 @@ class _Crossings:
             reach = _LIPS_MM if name.startswith("lip_seam") else _LIDS_MM if name.startswith("lid_") else 0.0
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=max(reach, 1e-9))[0] < reach
         self.near = Parting(self.V, faces, near[faces].all(axis=1), asked)
-        self.all = Parting(self.V, faces, np.ones(len(faces), bool), asked)
+        still = face.regions["scalp"] | face.regions["ear_left"] | face.regions["ear_right"]
+        self.all = Parting(self.V, faces, ~still[self.at][faces].any(axis=1), asked)
         self.halves = read_working_set().halves(targets.names)
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]

@@ -16,9 +16,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
+
+
+_FOLD = 10.0  # crossings that a folded face counts as
+_FLAT_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,8 @@ class PartingOptions:
     opposed   length of the difference of two normals from which on it says along which way faces part
     shorter   share of the other way out at which one is taken whatever lies there
     least_act less of a motion than this counts as so much: a correction of a small part would be a large one of the whole
-    rounds    of looking for crossings; sweeps over what has been found, in each
+    farthest_mm by which a vertex is moved in all
+    patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
     """
 
     gap_mm: float = 0.005
@@ -38,7 +44,8 @@ class PartingOptions:
     opposed: float = 0.2
     shorter: float = 1 / 3
     least_act: float = 0.25
-    rounds: int = 8
+    farthest_mm: float = 0.5
+    patience: int = 3
     sweeps: int = 6
 
 
@@ -65,17 +72,27 @@ class Parting:
         """
         field = np.zeros_like(self.rest)
         poses = [_Pose(pose[self.used], self._cut(act)) for pose, act in zip(poses, acts)]
-        best, fewest = field, np.inf
-        for _ in range(self.options.rounds + 1):
+        best, fewest, waited = field, np.inf, 0
+        while waited < self.options.patience:
             left = sum(self._look(pose, field) for pose in poses)
-            if left < fewest:
-                best, fewest = field, left
             if not left:
-                break
+                return self._of_skin(field)
+            faults = left + _FOLD * sum(self._folds(pose, field) for pose in poses if len(pose.met))
+            waited += 1
+            if faults < fewest:
+                best, fewest, waited = field, faults, 0
             for pose in poses:
-                field = field + self._apart(pose, field)
+                field = self._within(field + self._apart(pose, field))
+                field = self._within(field + self._flat(pose, field))
+        return self._of_skin(best)
+
+    def _within(self, field):
+        length = np.linalg.norm(field, axis=1, keepdims=True)
+        return field * np.minimum(1.0, self.options.farthest_mm / np.maximum(length, 1e-12))
+
+    def _of_skin(self, field):
         result = np.zeros((self._n, 3))
-        result[self.used] = best
+        result[self.used] = field
         return result
 
     def _cut(self, act):
@@ -103,6 +120,17 @@ class Parting:
             pose.senses = self._senses(now, pose)
         return len(pairs)
 
+    def _folds(self, pose, field):
+        return len(folded_by_shape(self.rest, pose.skin(field), self.faces))
+
+    def _flat(self, pose, field):
+        """(k, 3) what turns back faces of a pose that have been folded."""
+        if not len(pose.pairs):
+            return 0.0
+        now = pose.skin(field)
+        flat = laid_flat(self.rest, now, self.faces, np.ones(len(now)), rounds=_FLAT_ROUNDS)
+        return (flat - now) / np.maximum(pose.act, self.options.least_act)
+
     def _ways(self, now, pairs):
         """(k, 3) from the first face of each pair to the second, in the mean of what their corners look along."""
         normals = vertex_normals(now, self.faces)
@@ -120,20 +148,33 @@ class Parting:
         Pairs that hang together are one crossing and decide together, the first ones for all that come later. Where one
         way out is much shorter than the other it is taken; else flesh decides.
         """
-        m, known = len(self.faces), len(pose.senses)
-        links = np.ones(len(pose.met)), (pose.met[:, 0], pose.met[:, 1])
-        label = connected_components(sp.coo_matrix(links, shape=(m, m)), directed=False)[1][pose.met[:, 0]]
-        decided = np.bincount(label[:known], pose.senses, minlength=m)
-        pairs, mine = pose.met[known:], label[known:]
-        votes = np.bincount(mine, np.clip(self._flesh(now, pairs), 0.0, 1.0) - 0.5, minlength=m)
+        known, corners = len(pose.senses), pose.met.ravel()
+        _, ends = np.unique(corners, return_inverse=True)
+        a, b = ends.reshape(-1, 2).T
+        count = ends.max() + 1
+        links = sp.coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+        label = connected_components(links, directed=False)[1][a]
+        votes = np.zeros(count)
+        np.add.at(votes, label[:known], pose.senses)
+        new = np.flatnonzero(votes[label[known:]] == 0.0)
+        pairs, mine = pose.met[known:][new], label[known:][new]
+        if len(new):
+            votes += self._votes(now, pairs, mine, count)
+        return np.append(pose.senses, np.where(votes > 0.0, 1.0, -1.0)[label[known:]])
+
+    def _votes(self, now, pairs, label, count):
+        """(count,) of each crossing: more than 0 where its pairs (k, 2), labelled (k,), are skins that meet."""
         ways, (a, b) = normalized(self._ways(now, pairs)), self.faces[pairs.T]
-        deep = np.zeros((2, m))
+        votes, deep = np.zeros(count), np.zeros((2, count))
         for most, way in zip(deep, (ways, -ways)):
-            np.maximum.at(most, mine, overlap_along(now[a], now[b], way)[0])
+            np.maximum.at(most, label, overlap_along(now[a], now[b], way)[0])
         for sign, (one, other) in ((1.0, deep), (-1.0, deep[::-1])):
-            votes = np.where(one < self.options.shorter * other, sign, votes)
-        votes = np.where(decided != 0.0, decided, votes)
-        return np.append(pose.senses, np.where(votes > 0.0, 1.0, -1.0)[mine])
+            votes[one < self.options.shorter * other] = sign
+        unsure = votes[label] == 0.0
+        if unsure.any():
+            flesh = np.clip(self._flesh(now, pairs[unsure]), 0.0, 1.0)
+            votes += np.bincount(label[unsure], flesh - 0.5, minlength=count)
+        return votes
 
     def _winding(self, skin, points):
         tree = igl.FastWindingNumberBVH()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.mesh.normals import normalized
+from facewright.mesh.normals import cross, normalized
 
 _ON_EDGE = 1e-9  # of a triangle: as near to its border as this counts as on it
 _NOTHING = 1e-15
@@ -46,7 +46,7 @@ def crossing_points(one, other):
     """(k, 3) a point on the line in which triangles one, other (k, 3, 3) cross; their middles where they do not."""
     total, count = np.zeros((len(one), 3)), np.zeros(len(one))
     for a, b in ((one, other), (other, one)):
-        normal = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
+        normal = cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
         height = np.einsum("kij,kj->ki", a - b[:, :1], normal)
         for i in range(3):
             fall = height[:, i] - height[:, i - 2]
@@ -54,7 +54,7 @@ def crossing_points(one, other):
             point = a[:, i] + t[:, None] * (a[:, i - 2] - a[:, i])
             pierced = height[:, i] * height[:, i - 2] < 0.0
             for j in range(3):
-                side = np.cross(b[:, j - 2] - b[:, j], point - b[:, j])
+                side = cross(b[:, j - 2] - b[:, j], point - b[:, j])
                 pierced &= np.einsum("kj,kj->k", side, normal) >= 0.0
             total[pierced] += point[pierced]
             count += pierced
@@ -65,8 +65,8 @@ def crossing_points(one, other):
 def _planes(direction):
     """Two unit vectors (k, 3) across each direction (k, 3)."""
     least = np.eye(3)[np.abs(direction).argmin(axis=1)]
-    u = normalized(np.cross(direction, least))
-    return u, np.cross(direction, u)
+    u = normalized(cross(direction, least))
+    return u, cross(direction, u)
 
 
 def _seen(triangle, u, v, direction):
