@@ -38,13 +38,14 @@ class _Crossings:
         self.at = template.skin.vertex_slice
         self.V, faces = face.vertices[self.at], template.faces[template.skin.face_slice]
         asked = face.regions["face"][self.at][faces].all(axis=1)
+        hidden = ~face.regions["outer"][self.at]
         near = np.zeros(len(self.V), bool)
         for name, line in face.lines.items():
             reach = _LIPS_MM if name.startswith("lip_seam") else _LIDS_MM if name.startswith("lid_") else 0.0
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=max(reach, 1e-9))[0] < reach
-        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked)
+        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, hidden)
         still = face.regions["scalp"] | face.regions["ear_left"] | face.regions["ear_right"]
-        self.all = Parting(self.V, faces, ~still[self.at][faces].any(axis=1), asked)
+        self.all = Parting(self.V, faces, ~still[self.at][faces].any(axis=1), asked, hidden)
         self.halves = read_working_set().halves(targets.names)
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]

@@ -97,7 +97,7 @@ class LipContact:
         rest = np.ascontiguousarray(vertices[self.used])
         ties = self._ties(rest, outer[self.used]) if self.options.tie_mm else None
         self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm, ties=ties)
-        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used])
+        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used], ties=ties)
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)

@@ -10,6 +10,7 @@ _REACH_MM = 8.0  # over the skin from the margins: what the other lid may meet
 _GAP_MM = 0.1  # left between two rims
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
+_NO_AREA = 1e-12
 
 
 class LidRims:
@@ -53,14 +54,22 @@ def _highest(points, place, height, faces):
 
     place (n, 2), height (n,) of vertices; faces (m, 3)
     """
-    a, b, c = (place[faces[:, i]] for i in range(3))
-    e, f = b - a, c - a
+    corners = place[faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    near = (points[:, None, 0] >= low[:, 0]) & (points[:, None, 0] <= high[:, 0])
+    near &= (points[:, None, 1] >= low[:, 1]) & (points[:, None, 1] <= high[:, 1])
+    who, face = np.nonzero(near)
+    a, b, c = (corners[face, i] for i in range(3))
+    e, f, to = b - a, c - a, points[who] - a
     area = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
-    area = np.where(np.abs(area) < 1e-12, np.inf, area)
-    to = points[:, None] - a
-    second = (to[..., 0] * f[:, 1] - to[..., 1] * f[:, 0]) / area
-    third = (e[:, 0] * to[..., 1] - e[:, 1] * to[..., 0]) / area
-    inside = (second >= 0.0) & (third >= 0.0) & (second + third <= 1.0) & np.isfinite(area)
-    first, h = 1.0 - second - third, height[faces]
+    flat = np.abs(area) < _NO_AREA
+    area = np.where(flat, 1.0, area)
+    second = (to[:, 0] * f[:, 1] - to[:, 1] * f[:, 0]) / area
+    third = (e[:, 0] * to[:, 1] - e[:, 1] * to[:, 0]) / area
+    first = 1.0 - second - third
+    inside = ~flat & (first >= 0.0) & (second >= 0.0) & (third >= 0.0)
+    h = height[faces[face]]
+    result = np.full(len(points), -np.inf)
     found = first * h[:, 0] + second * h[:, 1] + third * h[:, 2]
-    return np.where(inside, found, -np.inf).max(axis=1, initial=-np.inf)
+    np.maximum.at(result, who[inside], found[inside])
+    return result
