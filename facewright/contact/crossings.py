@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.contact.parting import Parting
+from facewright.contact.targets import is_even
 from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
 from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
@@ -16,6 +17,7 @@ from facewright.working_set import read_working_set
 
 _LIPS_MM, _LIDS_MM = 30.0, 10.0  # from their lines: skin that may come to cross
 _TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
+_SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
 _FAR_MM = 20.0  # what moves farther may cross elsewhere, as chin and neck do
 
 
@@ -27,7 +29,8 @@ def part_crossings(face, targets, jobs=1):
     work = _Crossings(face, targets)
     with ThreadPoolExecutor(jobs) as pool:
         targets = work.with_shapes(targets, pool.map)
-        return work.with_pairs(targets, pool.map)
+        targets = work.with_pairs(targets, pool.map)
+    return targets.evened(face.template.mirror) if is_even(face) else targets
 
 
 class _Crossings:
@@ -38,14 +41,16 @@ class _Crossings:
         self.at = template.skin.vertex_slice
         self.V, faces = face.vertices[self.at], template.faces[template.skin.face_slice]
         asked = face.regions["face"][self.at][faces].all(axis=1)
-        hidden = ~face.regions["outer"][self.at]
+        farthest = np.where(face.regions["outer"][self.at], _SEEN_MM, _HIDDEN_MM)
         near = np.zeros(len(self.V), bool)
         for name, line in face.lines.items():
             reach = _LIPS_MM if name.startswith("lip_seam") else _LIDS_MM if name.startswith("lid_") else 0.0
+            if name.startswith("lid_"):
+                farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=max(reach, 1e-9))[0] < reach
-        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, hidden)
+        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
         still = face.regions["scalp"] | face.regions["ear_left"] | face.regions["ear_right"]
-        self.all = Parting(self.V, faces, ~still[self.at][faces].any(axis=1), asked, hidden)
+        self.all = Parting(self.V, faces, ~still[self.at][faces].any(axis=1), asked, farthest)
         self.halves = read_working_set().halves(targets.names)
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]

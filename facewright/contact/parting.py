@@ -34,7 +34,6 @@ class PartingOptions:
     opposed   length of the difference of two normals from which on it says along which way faces part
     shorter   share of the other way out at which one is taken whatever lies there
     least_act less of a motion than this counts as so much: a correction of a small part would be a large one of the whole
-    farthest_mm by which a vertex is moved in all: one that is seen, and one that is hidden
     patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
     """
 
@@ -44,7 +43,6 @@ class PartingOptions:
     opposed: float = 0.2
     shorter: float = 1 / 3
     least_act: float = 0.25
-    farthest_mm: tuple[float, float] = (0.5, 1.5)
     patience: int = 3
     sweeps: int = 6
 
@@ -53,15 +51,15 @@ class Parting:
     """The skin of one head, asked for crossings in any pose of it that it has not at rest.
 
     vertices (n, 3) mm at rest, faces (m, 3); near (m,) bool: faces that may cross; asked (m,) bool: one of a pair
-    hidden   (n,) bool: vertices that nobody sees, which may move farther
+    farthest (n,) mm by which vertices are moved at most
     """
 
-    def __init__(self, vertices, faces, near, asked, hidden, options=None):
+    def __init__(self, vertices, faces, near, asked, farthest, options=None):
         self.options = options or PartingOptions()
         self.used, local = np.unique(faces[near], return_inverse=True)
         self.faces = np.ascontiguousarray(local.reshape(-1, 3))
         self.rest, self.asked, self._n = vertices[self.used], asked[near], len(vertices)
-        self._farthest = np.where(hidden[self.used], *self.options.farthest_mm[::-1])[:, None]
+        self._farthest = farthest[self.used, None]
         self._before = self._keys(self_intersections(self.rest, self.faces))
         # What is left out here would close these faces: in front of the skin at rest there is no flesh.
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)

@@ -1,4 +1,4 @@
-"""The rims of shut lids lie on each other: round as they are, they would pass through each other where their margins meet."""
+"""The rims of shut lids lie on each other: round as they are, they would pass through each other in front of the margins."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from facewright.mesh.seam import seam_sides
 
 _REACH_MM = 8.0  # over the skin from the margins: what the other lid may meet
 _GAP_MM = 0.1  # left between two rims
+_MARGIN_GAP_MM = 0.05  # between their inner edges, which have been joined but for the chords of their own vertices
+_ENDS_MM = 2.0  # from a canthus: there it sets in
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
 _NO_AREA = 1e-12
@@ -21,13 +23,16 @@ class LidRims:
 
     def __init__(self, vertices, faces, upper, lower):
         sides = seam_sides(vertices, faces, upper, lower, _REACH_MM)
-        self.sides = [np.flatnonzero(side) for side in sides]
+        margins = np.zeros(len(vertices), bool)
+        margins[upper] = margins[lower] = True
+        self.sides = [np.flatnonzero(side & ~margins) for side in sides]
         patches = []
         for side, line in zip(sides, (upper, lower)):
             mine = side.copy()
             mine[line] = True
             patches.append(faces[mine[faces].all(axis=1)])
         self.patches = patches
+        self._margins = [(line, sign * _from_ends(vertices[line])) for line, sign in ((upper, 0.5), (lower, -0.5))]
 
     def turns(self, along, radius, angle):
         """(n,) radians by which vertices turn about the eye's axis so that no rim lies in the other one.
@@ -37,16 +42,23 @@ class LidRims:
         so nothing moves that is seen.
         """
         place, turned = np.stack([along, radius], axis=1), np.array(angle)
+        for line, share in self._margins:
+            turned[line] += share * _MARGIN_GAP_MM / radius[line]
         for _ in range(_ROUNDS):
-            over = []
-            for mine, patch, sign in zip(self.sides, self.patches[::-1], (1.0, -1.0)):
-                other = sign * _highest(place[mine], place, sign * turned, patch)
-                depth = sign * (other - turned[mine]) + _GAP_MM / radius[mine]
-                deep = (depth > 0.0) & (depth < _DEEPEST_MM / radius[mine])
-                over.append(np.where(deep, 0.5 * sign * depth, 0.0))
-            for mine, turn in zip(self.sides, over):
-                turned[mine] += turn
+            over = [
+                sign * (sign * _highest(place[mine], place, sign * turned, patch) - turned[mine]) * radius[mine] + _GAP_MM
+                for mine, patch, sign in zip(self.sides, self.patches[::-1], (1.0, -1.0))
+            ]
+            for mine, depth, sign in zip(self.sides, over, (1.0, -1.0)):
+                moves = (depth > 0.0) & (depth < _DEEPEST_MM)
+                turned[mine] += np.where(moves, 0.5 * sign * depth / radius[mine], 0.0)
         return turned - angle
+
+
+def _from_ends(chain):
+    """(k,) 0 at the ends of a chain of points (k, 3), 1 from _ENDS_MM on."""
+    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    return np.clip(np.minimum(steps, steps[-1] - steps) / _ENDS_MM, 0.0, 1.0)
 
 
 def _highest(points, place, height, faces):
