@@ -49,7 +49,7 @@ class LipOptions:
     near_mm: float = 20.0
     smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 9
     reach_mm: float = 4.0
-    tie_mm: float = 1.0
+    tie_mm: float = 1.5
     touch_mm: float = 0.15
     gap_mm: float = 0.05
     rest_mm: float = 0.1

@@ -7,8 +7,8 @@ import numpy as np
 from facewright.mesh.seam import seam_sides
 
 _REACH_MM = 8.0  # over the skin from the margins: what the other lid may meet
-_GAP_MM = 0.1  # left between two rims
-_MARGIN_GAP_MM = 0.05  # between their inner edges, which have been joined but for the chords of their own vertices
+_GAP_MM = 0.07  # left between two rims
+_MARGIN_GAP_MM = 0.03  # between their inner edges, which have been joined but for the chords of their own vertices
 _ENDS_MM = 2.0  # from a canthus: there it sets in
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
