@@ -15,7 +15,7 @@ from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
 
-_LIPS_MM, _LIDS_MM = 30.0, 10.0  # from their lines: skin that may come to cross
+_LIPS_MM, _LIDS_MM = 25.0, 10.0  # from their lines: skin that may come to cross
 _TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
 _FAR_MM = 20.0  # what moves farther may cross elsewhere, as chin and neck do

@@ -39,6 +39,7 @@ class LipOptions:
     near_mm  skin this far from the seam may give way, and says where flesh is
     smooth_mm width over which a push is felt, round by round: deep contact moves a lip as a whole, the rest is local
     gap_mm   between lips that have been pushed apart; rest_mm between their lines at rest, at least
+    tie_mm   width of bending up to which the two sides of a lip move as one
     touch_mm contact less deep than this is none
     teeth_mm how deep in a tooth skin may stay that is there at rest
     off_mm   how far before the teeth skin lies that was pushed out: their edges would stand out between its vertices
@@ -95,9 +96,9 @@ class LipContact:
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
-        ties = self._ties(rest, outer[self.used]) if self.options.tie_mm else None
+        ties = self._ties(rest, outer[self.used])
         self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm, ties=ties)
-        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used], ties=ties)
+        self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used])
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)

@@ -42,10 +42,9 @@ class LipSlit:
 
     vertices (n, 3) of the surroundings of the lips at rest, faces (m, 3); patches: faces of the upper and the lower lip
     seams    the two lines, paired; outer (n,) bool; free (n,) bool: skin that may follow
-    ties     as SoftSpread takes them: vertices that move alike
     """
 
-    def __init__(self, vertices, faces, patches, seams, outer, free, options=None, ties=None):
+    def __init__(self, vertices, faces, patches, seams, outer, free, options=None):
         self.options = options or ShutOptions()
         self.seams = seams
         seam = np.unique(np.concatenate(seams))
@@ -54,7 +53,7 @@ class LipSlit:
         pitch = np.radians(self.options.pitch_deg)
         self._heights = [np.array([0.0, np.cos(pitch), turn * np.sin(pitch)]) for turn in (-1.0, 1.0)]
         self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
-        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm, seam, ties)
+        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm, asking=seam)
         corners = cKDTree(vertices[seams[0][[0, -1]]])
         self._asked = [corners.query(vertices[line[1:-1]])[0] > self.options.corner_mm for line in seams]
         self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]
