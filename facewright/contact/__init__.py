@@ -1,7 +1,7 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
-from facewright.contact.eyes import EyeShapeOptions, solve_eyes
 from facewright.contact.crossings import part_crossings
+from facewright.contact.eyes import EyeShapeOptions, solve_eyes
 from facewright.contact.folds import lay_flat
 from facewright.contact.jaw import find_jaw, keep_jaw_within
 from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth

@@ -18,12 +18,14 @@ from facewright.working_set import read_working_set
 _LIPS_MM, _LIDS_MM = 25.0, 10.0  # from their lines: skin that may come to cross
 _TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
-_FAR_MM = 20.0  # what moves farther may cross elsewhere, as chin and neck do
+_FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
+_MOVES_MM = 1.0  # where an open jaw moves the skin by so much
 
 
 def part_crossings(face, targets, jobs=1):
-    """Targets of a data.Face in which no shape, none of its halves and no named pair has crossings that the neutral has not.
+    """Targets of a data.Face in which no shape, none of its halves and no named pair has crossings of its own.
 
+    What crosses in the neutral may go on doing so; where little can be moved a few pairs of faces are left.
     Corrections of pairs go into their correctives; a shape's in-betweens get their share of its own.
     """
     work = _Crossings(face, targets)
@@ -49,8 +51,9 @@ class _Crossings:
                 farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=max(reach, 1e-9))[0] < reach
         self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
-        still = face.regions["scalp"] | face.regions["ear_left"] | face.regions["ear_right"]
-        self.all = Parting(self.V, faces, ~still[self.at][faces].any(axis=1), asked, farthest)
+        if "jawOpen" in targets.names:
+            near |= np.abs(targets.delta("jawOpen")[self.at]).max(axis=1) > _MOVES_MM
+        self.wide = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
         self.halves = read_working_set().halves(targets.names)
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]
@@ -59,7 +62,7 @@ class _Crossings:
         """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say."""
         motions = [motion[self.at] for motion in motions]
         far = max(np.abs(motion).max(initial=0.0) for motion in motions) > _FAR_MM
-        return (self.all if far else self.near)([self.V + motion for motion in motions], acts)
+        return (self.wide if far else self.near)([self.V + motion for motion in motions], acts)
 
     def with_shapes(self, targets, run):
         """Targets whose shapes have no crossings, nor the halves of those that have any."""

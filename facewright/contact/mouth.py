@@ -156,10 +156,11 @@ class _Mouth:
         mobility = (away <= self.options.flat_mm).astype(float)
         mobility[np.concatenate(self.seams)] = SEAM_MOBILITY
         deltas = np.array(targets.deltas)
+        near = self.faces[(away <= 2.0 * self.options.flat_mm)[self.faces].any(axis=1)]
 
         def flat(name):
             moved = skin + targets.delta(name)[self.skin]
-            return laid_flat(skin, moved, self.faces, mobility) - moved
+            return laid_flat(skin, moved, near, mobility) - moved
 
         names = self._lip_shapes(targets)
         for name, change in zip(names, self._each(flat, names)):

@@ -21,7 +21,6 @@ from facewright.mesh.intersect import intersections_of, self_intersections
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
 
-
 _FOLD = 10.0  # crossings that a folded face counts as
 _FLAT_ROUNDS = 3
 
@@ -33,7 +32,7 @@ class PartingOptions:
     aside_mm  from a crossing: there flesh is asked for
     opposed   length of the difference of two normals from which on it says along which way faces part
     shorter   share of the other way out at which one is taken whatever lies there
-    least_act less of a motion than this counts as so much: a correction of a small part would be a large one of the whole
+    least_act where the correction acts less it is taken to act so much, or it would grow large for the rest
     patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
     """
 

@@ -1,4 +1,4 @@
-"""The rims of shut lids lie on each other: round as they are, they would pass through each other in front of the margins."""
+"""The rims of shut lids lie on each other: round as they are, they would pass through each other."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ class LidRims:
         margins = np.zeros(len(vertices), bool)
         margins[upper] = margins[lower] = True
         self.sides = [np.flatnonzero(side & ~margins) for side in sides]
-        patches = []
+        self.patches = []
         for side, line in zip(sides, (upper, lower)):
             mine = side.copy()
             mine[line] = True
-            patches.append(faces[mine[faces].all(axis=1)])
-        self.patches = patches
+            self.patches.append(faces[mine[faces].all(axis=1)])
         self._margins = [(line, sign * _from_ends(vertices[line])) for line, sign in ((upper, 0.5), (lower, -0.5))]
 
     def turns(self, along, radius, angle):
         """(n,) radians by which vertices turn about the eye's axis so that no rim lies in the other one.
 
         along, radius (n,) mm along the axis and from it; angle (n,) radians about it, growing upwards. Both lids give
-        way half and half, to the surface midway between them, which passes through the line where they meet in front:
-        so nothing moves that is seen.
+        way half and half, to the surface midway between them. It ends at the line where they meet in front, so hardly
+        anything moves that is seen.
         """
         place, turned = np.stack([along, radius], axis=1), np.array(angle)
         for line, share in self._margins:
             turned[line] += share * _MARGIN_GAP_MM / radius[line]
         for _ in range(_ROUNDS):
-            over = [
-                sign * (sign * _highest(place[mine], place, sign * turned, patch) - turned[mine]) * radius[mine] + _GAP_MM
-                for mine, patch, sign in zip(self.sides, self.patches[::-1], (1.0, -1.0))
-            ]
-            for mine, depth, sign in zip(self.sides, over, (1.0, -1.0)):
+            turns = []
+            for mine, patch, sign in zip(self.sides, self.patches[::-1], (1.0, -1.0)):
+                over = _highest(place[mine], place, sign * turned, patch) - sign * turned[mine]
+                depth = over * radius[mine] + _GAP_MM
                 moves = (depth > 0.0) & (depth < _DEEPEST_MM)
-                turned[mine] += np.where(moves, 0.5 * sign * depth / radius[mine], 0.0)
+                turns.append(np.where(moves, 0.5 * sign * depth / radius[mine], 0.0))
+            for mine, turn in zip(self.sides, turns):
+                turned[mine] += turn
         return turned - angle
 
 
