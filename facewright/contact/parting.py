@@ -23,6 +23,7 @@ from facewright.mesh.overlap import crossing_points, overlap_along
 
 _FOLD = 10.0  # crossings that a folded face counts as
 _FLAT_ROUNDS = 3
+_STILL_MM, _ABOUT_MM = 1e-4, 1.0
 
 
 @dataclass(frozen=True)
@@ -104,8 +105,8 @@ class Parting:
         """Number of new crossings of a pose; those found are remembered with their sense."""
         now = pose.skin(field)
         if pose.looked is None:
-            stirred = (np.abs(now - self.rest).max(axis=1) > 1e-4)[self.faces].any(axis=1)
-            pairs = self_intersections(now, self.faces, stirred) if stirred.any() else pose.pairs
+            stirred = np.abs(now - self.rest).max(axis=1) > _STILL_MM
+            pairs = self_intersections(now, self.faces, self._about(now, stirred)) if stirred.any() else pose.pairs
         else:
             touched = (now != pose.looked).any(axis=1)[self.faces].any(axis=1)
             kept = pose.pairs[~touched[pose.pairs].any(axis=1)]
@@ -118,6 +119,11 @@ class Parting:
             pose.met = np.concatenate([pose.met, fresh])
             pose.senses = self._senses(now, pose)
         return len(pairs)
+
+    def _about(self, now, stirred):
+        """(m,) bool: faces of vertices that are stirred or lie among those."""
+        low, high = now[stirred].min(axis=0) - _ABOUT_MM, now[stirred].max(axis=0) + _ABOUT_MM
+        return (stirred | ((now > low) & (now < high)).all(axis=1))[self.faces].any(axis=1)
 
     def _folds(self, pose, field):
         return len(folded_by_shape(self.rest, pose.skin(field), self.faces))
