@@ -126,7 +126,8 @@ class Parting:
         return (stirred | ((now > low) & (now < high)).all(axis=1))[self.faces].any(axis=1)
 
     def _folds(self, pose, field):
-        return len(folded_by_shape(self.rest, pose.skin(field), self.faces))
+        """Number of folded faces of a pose among those that the correction moves."""
+        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, field.any(axis=1)[self.faces].any(axis=1)))
 
     def _flat(self, pose, field):
         """(k, 3) what turns back faces of a pose that have been folded."""
