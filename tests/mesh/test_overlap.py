@@ -19,7 +19,8 @@ def test_parallel_triangles_overlap_by_their_distance():
     assert np.allclose([one.sum(axis=1), other.sum(axis=1)], 1.0)
 
 
-def test_the_deepest_place_is_the_same_on_both(rng=np.random.default_rng(4)):
+def test_the_deepest_place_is_the_same_on_both():
+    rng = np.random.default_rng(4)
     one, other = rng.normal(size=(2, 200, 3, 3))
     way = normalized(rng.normal(size=(200, 3)))
     depth, a, b = overlap_along(one, other, way)
@@ -30,7 +31,8 @@ def test_the_deepest_place_is_the_same_on_both(rng=np.random.default_rng(4)):
     assert (a[met] >= -1e-6).all() and (b[met] >= -1e-6).all()
 
 
-def test_moving_by_the_overlap_leaves_nothing(rng=np.random.default_rng(5)):
+def test_moving_by_the_overlap_leaves_nothing():
+    rng = np.random.default_rng(5)
     one, other = rng.normal(size=(2, 200, 3, 3))
     way = normalized(rng.normal(size=(200, 3)))
     depth = overlap_along(one, other, way)[0]
@@ -49,6 +51,7 @@ def test_a_crossing_lies_in_both_planes():
     assert np.isclose(point[2], 0.0) and np.isclose(point[1], 1.0) and 0.8 < point[0] < 1.2
 
 
-def test_cross_is_numpys(rng=np.random.default_rng(6)):
+def test_cross_is_numpys():
+    rng = np.random.default_rng(6)
     a, b = rng.normal(size=(2, 50, 3))
     assert np.array_equal(cross(a, b), np.cross(a, b))
