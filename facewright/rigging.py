@@ -16,6 +16,7 @@ from facewright.contact import (
     keep_jaw_within,
     lay_flat,
     lay_tongue,
+    part_crossings,
     part_lips,
     solve_eyes,
     solve_mouth,
@@ -30,7 +31,7 @@ def shapes_of(face, jobs=1):
     carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
     carried = lay_tongue(face, keep_jaw_within(face, carried))
     skin = solve_mouth(face, solve_eyes(face, carried), jobs=jobs)
-    return _with_riders(face, lay_flat(face, skin))
+    return _with_riders(face, part_crossings(face, lay_flat(face, skin), jobs))
 
 
 def rig_from_face(face, maps=None, jobs=1):

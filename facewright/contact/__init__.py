@@ -1,5 +1,6 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
+from facewright.contact.crossings import part_crossings
 from facewright.contact.eyes import EyeShapeOptions, solve_eyes
 from facewright.contact.folds import lay_flat
 from facewright.contact.jaw import find_jaw, keep_jaw_within
@@ -18,6 +19,7 @@ __all__ = [
     "keep_jaw_within",
     "lay_flat",
     "lay_tongue",
+    "part_crossings",
     "part_lips",
     "solve_eyes",
     "solve_mouth",

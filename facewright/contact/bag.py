@@ -46,9 +46,11 @@ class MouthBag:
         away = cKDTree(vertices[np.concatenate(seams)]).query(vertices)[0]
         stays, gives = self.options.lip_mm
         self.free = inner * np.clip((away - stays) / (gives - stays), 0.0, 1.0)
-        self.faces = faces
         least, most = self.options.face_mm
         self.patch = faces[(outer & (away > least) & (away < most))[faces].all(axis=1)]
+        of_patch = np.zeros(len(vertices), bool)
+        of_patch[self.patch] = True
+        self._around = faces[of_patch[faces].any(axis=1)]  # what the normals of the patch depend on
         mine = faces[inner[faces].all(axis=1) & (self.free[faces] > 0.0).any(axis=1)]
         self.corners = np.repeat(mine, len(_SAMPLES), axis=0)
         self.shares = np.tile(_SAMPLES, (len(mine), 1))
@@ -89,7 +91,7 @@ class MouthBag:
         """(k,) how far samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
         points = self._samples(skin, index)
         found = Surface(skin, self.patch).closest(points)
-        normal = interpolate(vertex_normals(skin, self.faces), self.patch, found.faces, found.barycentric)
+        normal = interpolate(vertex_normals(skin, self._around), self.patch, found.faces, found.barycentric)
         height = ((points - found.points) * normal).sum(axis=1)
         # Past its rim no such skin lies before the lining.
         beyond = (self._rim[self.patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)

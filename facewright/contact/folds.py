@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.mesh.folds import laid_flat
-from facewright.transfer.shapes import CORRECTIVE_BASE
+from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
 
 SEAM_MOBILITY = 0.2  # of the line where the lips meet
 _MOVES_MM = 1e-3
@@ -23,8 +23,7 @@ def lay_flat(face, targets):
     V = face.vertices[at]
     faces = face.template.faces[skin.face_slice]
     faces = faces[~face.regions["mouth_interior"][at][faces].any(axis=1)]
-    # With their mirror images, so that both sides are treated alike however their quads are cut.
-    faces = np.concatenate([faces, face.template.mirror[faces][:, [0, 2, 1]]])
+    faces = even_handed(faces, face.template.mirror)[0]
     ease = (~face.regions["mouth_interior"][at]).astype(float)
     for name, line in face.lines.items():
         if name.startswith("lip_seam"):

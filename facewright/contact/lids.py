@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from facewright.contact.rims import LidRims
 from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.folds import laid_flat
 from facewright.mesh.spread import SmoothSpread
@@ -71,6 +72,7 @@ class Lids:
         self._corner = np.isin(self.skin, self.canthi)
         self._corners = None
         self._near_faces = faces[free[faces].any(axis=1)]
+        self._rims = LidRims(vertices, faces[outer[faces].all(axis=1)], self.upper, self.lower)
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
         self._ease = free.astype(float)
         self._ease[self.margin] = 0.0
@@ -226,7 +228,13 @@ class Lids:
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self.lifted(pose + np.stack(spread, axis=1), ball)
+        return self._met(self.lifted(pose + np.stack(spread, axis=1), ball))
+
+    def _met(self, pose):
+        """The pose (n, 3) of closed lids whose rims lie on each other."""
+        offset = pose - self.ball.center
+        radius = np.hypot(offset @ self.up, offset @ self.forward)
+        return self.rotated(pose, self._rims.turns(offset @ self.axis, radius, self.angles(pose)))
 
     def _closed_radius(self, points, canthi, ball):
         """(k,) distance from the centre that closed margins have at points (k, 3)."""

@@ -20,6 +20,7 @@ from facewright.contact.teeth import Teeth
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.spread import SoftSpread
@@ -38,6 +39,8 @@ class LipOptions:
     near_mm  skin this far from the seam may give way, and says where flesh is
     smooth_mm width over which a push is felt, round by round: deep contact moves a lip as a whole, the rest is local
     gap_mm   between lips that have been pushed apart; rest_mm between their lines at rest, at least
+    tie_mm   width of bending up to which the two sides of a lip move as one, tied_mm from the seam on they do not: what
+             teeth push there would bulge the skin
     touch_mm contact less deep than this is none
     teeth_mm how deep in a tooth skin may stay that is there at rest
     off_mm   how far before the teeth skin lies that was pushed out: their edges would stand out between its vertices
@@ -48,6 +51,8 @@ class LipOptions:
     near_mm: float = 20.0
     smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 9
     reach_mm: float = 4.0
+    tie_mm: float = 1.5
+    tied_mm: float = 6.0
     touch_mm: float = 0.15
     gap_mm: float = 0.05
     rest_mm: float = 0.1
@@ -93,7 +98,9 @@ class LipContact:
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
         rest = np.ascontiguousarray(vertices[self.used])
-        self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm)
+        tied = cKDTree(vertices[seam]).query(rest)[0] < self.options.tied_mm
+        ties = self._ties(rest, outer[self.used], tied)
+        self.spread = SoftSpread(rest, self.faces, near[self.used], self.options.reach_mm, ties=ties)
         self.slit = LipSlit(rest, self.faces, self.patches, lines, outer[self.used], near[self.used])
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
@@ -104,6 +111,15 @@ class LipContact:
         lips = [Watch(rest[mine], rest[other]) for mine, other in zip(self.sides, self.sides[::-1])]
         teeth = [Watch(rest[self._guarded], vertices[at]) for at, _ in self.teeth]
         self._at_rest = self._wishes(rest, vertices, _Watches(tuple(lips), tuple(teeth)))[2]
+
+    def _ties(self, rest, outer, tied):
+        """Ties of SoftSpread: lining moves with the skin of its lip that it lies behind."""
+        mass, found = lumped_mass(rest, self.faces), []
+        for side in self.sides:
+            lining, skin = side[tied[side] & ~outer[side]], side[outer[side]]
+            found.append((lining, skin[cKDTree(rest[skin]).query(rest[lining])[1]]))
+        lining, skin = map(np.concatenate, zip(*found))
+        return lining, skin, mass[lining] / self.options.tie_mm**4
 
     def shut(self, motion, weights=None, acts=None, lifted=False):
         """(n, 3) correction of a motion so that no slit is open between the lips where the correction acts most.

@@ -13,6 +13,7 @@ from facewright.contact.folds import SEAM_MOBILITY
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
+from facewright.contact.targets import is_even
 from facewright.contact.tongue import over_the_lip
 from facewright.conventions import (
     MOUTH_PAIRS,
@@ -28,7 +29,6 @@ from facewright.transfer.shapes import even_cut
 
 HALF = 0.5
 _MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
-_EVEN_MM = 1e-6
 PAIRS = (
     *MOUTH_PAIRS,
     ("mouthDimple", "jawOpen"),
@@ -97,13 +97,7 @@ def solve_mouth(face, targets, options=None, jobs=1):
     result = mouth.with_mouth_close(result)
     result = mouth.with_pairs(result)
     result = mouth.with_bag(mouth.with_tongue(result))
-    return result.evened(face.template.mirror) if _is_even(face) else result
-
-
-def _is_even(face):
-    """Whether the head is its own mirror image: then what rests on its middle line has no nearer side."""
-    mirrored = face.vertices[face.template.mirror] * [-1.0, 1.0, 1.0]
-    return bool(np.abs(mirrored - face.vertices).max() < _EVEN_MM)
+    return result.evened(face.template.mirror) if is_even(face) else result
 
 
 class _Mouth:
@@ -162,10 +156,11 @@ class _Mouth:
         mobility = (away <= self.options.flat_mm).astype(float)
         mobility[np.concatenate(self.seams)] = SEAM_MOBILITY
         deltas = np.array(targets.deltas)
+        near = self.faces[(away <= 2.0 * self.options.flat_mm)[self.faces].any(axis=1)]
 
         def flat(name):
             moved = skin + targets.delta(name)[self.skin]
-            return laid_flat(skin, moved, self.faces, mobility) - moved
+            return laid_flat(skin, moved, near, mobility) - moved
 
         names = self._lip_shapes(targets)
         for name, change in zip(names, self._each(flat, names)):

@@ -9,6 +9,8 @@ import numpy as np
 from facewright.conventions import in_between_name, mirrored_name
 from facewright.expand import expand_weights
 
+_EVEN_MM = 1e-6
+
 
 @dataclass(frozen=True)
 class Targets:
@@ -51,3 +53,9 @@ def _twin(target, targets):
         twins[name] = next((other for other, own in targets.correctives.items() if set(own) == mirrored), name)
     twin = twins.get(target, target)
     return twin if twin in targets.names or twin in targets.extras else target
+
+
+def is_even(face):
+    """Whether a head is its own mirror image: then what rests on its middle line has no nearer side."""
+    mirrored = face.vertices[face.template.mirror] * [-1.0, 1.0, 1.0]
+    return bool(np.abs(mirrored - face.vertices).max() < _EVEN_MM)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.mesh.adjacency import dilate
-from facewright.mesh.normals import face_areas, face_cross, face_normals
+from facewright.mesh.normals import cross, face_areas, face_cross, face_normals
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
 _LEAST_SHARE = 0.1  # of its area at rest that a face keeps, seen along the normal that it should have
@@ -108,7 +108,7 @@ def _way_back(points, faces, normals, least, ease):
         return None
     F, n = faces[small], normals[small]
     a, b, c = points[F[:, 0]], points[F[:, 1]], points[F[:, 2]]
-    gradient = 0.5 * np.stack([np.cross(b - c, n), np.cross(c - a, n), np.cross(a - b, n)], axis=1)
+    gradient = 0.5 * np.stack([cross(b - c, n), cross(c - a, n), cross(a - b, n)], axis=1)
     w = ease[F]
     size = (w * (gradient**2).sum(axis=2)).sum(axis=1)
     able = size > 1e-12

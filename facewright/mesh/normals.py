@@ -5,8 +5,17 @@ import numpy as np
 
 def face_cross(V, F):
     """(m, 3) cross products of two edges: normal times twice the area."""
-    a, b, c = V[F[:, 0]], V[F[:, 1]], V[F[:, 2]]
-    return np.cross(b - a, c - a)
+    a = V[F[:, 0]]
+    return cross(V[F[:, 1]] - a, V[F[:, 2]] - a)
+
+
+def cross(a, b):
+    """(k, 3) cross products of rows; numpy's own takes several times as long for few rows."""
+    result = np.empty_like(a)
+    for i in range(3):
+        j, k = i - 2, i - 1
+        result[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
+    return result
 
 
 def normalized(vectors):

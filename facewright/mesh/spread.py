@@ -57,9 +57,10 @@ class SoftSpread:
     What a push at one vertex does to all others is solved once; wishes of k vertices then cost a dense system of k.
     V (n, 3), F (m, 3), free (n,) bool; reach_mm: the field fades over this distance
     asking  indices of the vertices that may wish for something; default: all that are free
+    ties    (one (k,), other (k,), strength (k,)): vertices that shall move alike; adds strength |u_one - u_other|^2
     """
 
-    def __init__(self, V, F, free, reach_mm=5.0, asking=None):
+    def __init__(self, V, F, free, reach_mm=5.0, asking=None, ties=None):
         self._free, self._n = np.flatnonzero(free), len(V)
         asking = self._free if asking is None else np.intersect1d(asking, self._free)
         self._row = np.full(self._n, -1)
@@ -67,7 +68,10 @@ class SoftSpread:
         self._column = np.searchsorted(self._free, asking)
         pushes = np.zeros((len(self._free), len(asking)))
         pushes[self._column, np.arange(len(asking))] = 1.0
-        energy = _bending(V, F, reach_mm)[self._free][:, self._free]
+        energy = _bending(V, F, reach_mm)
+        if ties is not None:
+            energy = energy + _tied(*ties, self._n)
+        energy = energy[self._free][:, self._free]
         self._response = np.ascontiguousarray(Factorization(energy).solve(pushes).T)
 
     def __call__(self, wishes, weights, smooth_mm=1.0):
@@ -97,3 +101,11 @@ def _bending(V, F, reach_mm):
     L = sp.diags(np.asarray(W.sum(axis=1)).ravel()) - W
     mass = np.maximum(lumped_mass(V, F), 1e-3)
     return (L @ sp.diags(1.0 / mass) @ L + sp.diags(mass / reach_mm**4)).tocsr()
+
+
+def _tied(one, other, strength, n):
+    """(n, n) csr of the energy of ties."""
+    k = np.arange(len(one))
+    apart = sp.coo_matrix((np.ones(len(one)), (k, one)), shape=(len(one), n)).tocsr()
+    apart = apart - sp.coo_matrix((np.ones(len(one)), (k, other)), shape=(len(one), n)).tocsr()
+    return (apart.T @ sp.diags(strength) @ apart).tocsr()

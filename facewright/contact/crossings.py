@@ -1,0 +1,119 @@
+"""Targets without new crossings of faces: what contact has left is moved apart, pose by pose."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from facewright.contact.parting import Parting
+from facewright.contact.targets import is_even
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
+from facewright.transfer.halves import left_share
+from facewright.transfer.shapes import CORRECTIVE_BASE
+from facewright.working_set import read_working_set
+
+_LIPS_MM, _LIDS_MM = 25.0, 10.0  # from their lines: skin that may come to cross
+_TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
+_SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
+_FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
+_MOVES_MM = 1.0  # where an open jaw moves the skin by so much
+
+
+def part_crossings(face, targets, jobs=1):
+    """Targets of a data.Face in which no shape, none of its halves and no named pair has crossings of its own.
+
+    What crosses in the neutral may go on doing so; where little can be moved a few pairs of faces are left.
+    Corrections of pairs go into their correctives; a shape's in-betweens get their share of its own.
+    """
+    work = _Crossings(face, targets)
+    with ThreadPoolExecutor(jobs) as pool:
+        targets = work.with_shapes(targets, pool.map)
+        targets = work.with_pairs(targets, pool.map)
+    return targets.evened(face.template.mirror) if is_even(face) else targets
+
+
+class _Crossings:
+    """The skin of one face: where it may cross, and poses of it."""
+
+    def __init__(self, face, targets):
+        template = face.template
+        self.at = template.skin.vertex_slice
+        self.V, faces = face.vertices[self.at], template.faces[template.skin.face_slice]
+        asked = face.regions["face"][self.at][faces].all(axis=1)
+        farthest = np.where(face.regions["outer"][self.at], _SEEN_MM, _HIDDEN_MM)
+        near = np.zeros(len(self.V), bool)
+        for name, line in face.lines.items():
+            reach = _LIPS_MM if name.startswith("lip_seam") else _LIDS_MM if name.startswith("lid_") else 0.0
+            if name.startswith("lid_"):
+                farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
+            near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=max(reach, 1e-9))[0] < reach
+        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
+        if "jawOpen" in targets.names:
+            near |= np.abs(targets.delta("jawOpen")[self.at]).max(axis=1) > _MOVES_MM
+        self.wide = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
+        self.halves = read_working_set().halves(targets.names)
+        self.left = left_share(template)[self.at, None]
+        self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]
+
+    def _apart(self, motions, acts):
+        """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say."""
+        motions = [motion[self.at] for motion in motions]
+        far = max(np.abs(motion).max(initial=0.0) for motion in motions) > _FAR_MM
+        return (self.wide if far else self.near)([self.V + motion for motion in motions], acts)
+
+    def with_shapes(self, targets, run):
+        """Targets whose shapes have no crossings, nor the halves of those that have any."""
+        deltas, extras = np.array(targets.deltas), dict(targets.extras)
+
+        def field(name):
+            motion, base = targets.delta(name), CORRECTIVE_BASE.get(name)
+            if base in targets.names:
+                return self._apart([motion + targets.delta(base)], [1.0])
+            shares = [1.0, self.left, 1.0 - self.left] if name in self.halves else [1.0]
+            return self._apart([_shared(motion, share, self.at) for share in shares], shares)
+
+        for number, (name, change) in enumerate(zip(targets.names, run(field, targets.names))):
+            deltas[number, self.at] += change
+            for weight, step in targets.in_betweens.get(name, {}).items():
+                extras[step] = _plus(extras[step], weight * change, self.at)
+        return replace(targets, deltas=deltas, extras=extras)
+
+    def with_pairs(self, targets, run):
+        """Targets whose named pairs have none."""
+        extras = dict(targets.extras)
+        windows = [(EYE_PAIRS, self.is_left), ((*MOUTH_PAIRS, _TONGUE), self.left)]
+        pairs = [(_of_pair(pair, targets), window) for pairs, window in windows for pair in pairs]
+
+        def field(names):
+            drivers = {driver for name in names for driver in targets.correctives[name]}
+            return self._apart([targets.motion(dict.fromkeys(sorted(drivers), 1.0))], [1.0])
+
+        asked = [(names, window) for names, window in pairs if names]
+        for (names, window), change in zip(asked, run(field, [names for names, _ in asked])):
+            shares = (window, 1.0 - window) if len(names) > 1 else (1.0,)
+            for name, share in zip(names, shares):
+                extras[name] = _plus(extras[name], share * change, self.at)
+        return replace(targets, extras=extras)
+
+
+def _of_pair(pair, targets):
+    """The correctives of a pair of shapes: one, or those of left and right; () where there is none."""
+    sides = [name for name in targets.correctives if _unsided(targets.correctives[name]) == set(pair)]
+    return tuple(sorted(sides, key=lambda name: "Right" in name))
+
+
+def _unsided(names):
+    return {name.removesuffix("Left").removesuffix("Right") for name in names}
+
+
+def _shared(motion, share, at):
+    return _plus(np.zeros_like(motion), share * motion[at], at)
+
+
+def _plus(delta, change, at):
+    result = np.array(delta)
+    result[at] += change
+    return result

@@ -1,0 +1,226 @@
+"""Faces that cross are moved apart, a few hundredths of a millimetre: what is left when lips and lids have been solved.
+
+Contact asks vertices, and stops at a depth that nobody sees; edges of the small faces at a corner of the mouth and in
+shut lids still pass through each other. Here the pairs of faces that cross are found exactly and moved apart along the
+normals between them, as far as they reach past each other (position-based constraints: Mueller et al. 2007), until none
+crosses. Which of two sheets belongs in front is told by the winding number: between skins that meet it is that of flesh
+on either side of the crossing; between a skin and its own lining, turned inside out, that of air.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from facewright.mesh.folds import folded_by_shape, laid_flat
+from facewright.mesh.intersect import intersections_of, self_intersections
+from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.overlap import crossing_points, overlap_along
+
+_FOLD = 10.0  # crossings that a folded face counts as
+_FLAT_ROUNDS = 3
+_STILL_MM, _ABOUT_MM = 1e-4, 1.0
+
+
+@dataclass(frozen=True)
+class PartingOptions:
+    """gap_mm    left between faces that have been moved apart
+    most_mm   by which a pair is moved at once
+    aside_mm  from a crossing: there flesh is asked for
+    opposed   length of the difference of two normals from which on it says along which way faces part
+    shorter   share of the other way out at which one is taken whatever lies there
+    least_act where the correction acts less it is taken to act so much, or it would grow large for the rest
+    patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
+    """
+
+    gap_mm: float = 0.005
+    most_mm: float = 0.15
+    aside_mm: float = 0.005
+    opposed: float = 0.2
+    shorter: float = 1 / 3
+    least_act: float = 0.25
+    patience: int = 3
+    sweeps: int = 6
+
+
+class Parting:
+    """The skin of one head, asked for crossings in any pose of it that it has not at rest.
+
+    vertices (n, 3) mm at rest, faces (m, 3); near (m,) bool: faces that may cross; asked (m,) bool: one of a pair
+    farthest (n,) mm by which vertices are moved at most
+    """
+
+    def __init__(self, vertices, faces, near, asked, farthest, options=None):
+        self.options = options or PartingOptions()
+        self.used, local = np.unique(faces[near], return_inverse=True)
+        self.faces = np.ascontiguousarray(local.reshape(-1, 3))
+        self.rest, self.asked, self._n = vertices[self.used], asked[near], len(vertices)
+        self._farthest = farthest[self.used, None]
+        self._before = self._keys(self_intersections(self.rest, self.faces))
+        # What is left out here would close these faces: in front of the skin at rest there is no flesh.
+        outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
+        self._beyond = -self._winding(self.rest, outside)
+
+    def __call__(self, poses, acts):
+        """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
+
+        poses  sequence of (n, 3); acts: how strongly the correction acts in each, a number or (n, 1)
+        """
+        field = np.zeros_like(self.rest)
+        poses = [_Pose(pose[self.used], self._cut(act)) for pose, act in zip(poses, acts)]
+        best, fewest, waited = field, np.inf, 0
+        while waited < self.options.patience:
+            left = sum(self._look(pose, field) for pose in poses)
+            if not left:
+                return self._of_skin(field)
+            faults = left + _FOLD * sum(self._folds(pose, field) for pose in poses if len(pose.met))
+            waited += 1
+            if faults < fewest:
+                best, fewest, waited = field, faults, 0
+            for pose in poses:
+                field = self._within(field + self._apart(pose, field))
+                field = self._within(field + self._flat(pose, field))
+        return self._of_skin(best)
+
+    def _within(self, field):
+        length = np.linalg.norm(field, axis=1, keepdims=True)
+        return field * np.minimum(1.0, self._farthest / np.maximum(length, 1e-12))
+
+    def _of_skin(self, field):
+        result = np.zeros((self._n, 3))
+        result[self.used] = field
+        return result
+
+    def _cut(self, act):
+        return act[self.used] if np.ndim(act) else np.full((len(self.used), 1), float(act))
+
+    def _keys(self, pairs):
+        return pairs[:, 0] * len(self.faces) + pairs[:, 1]
+
+    def _look(self, pose, field):
+        """Number of new crossings of a pose; those found are remembered with their sense."""
+        now = pose.skin(field)
+        if pose.looked is None:
+            stirred = np.abs(now - self.rest).max(axis=1) > _STILL_MM
+            pairs = self_intersections(now, self.faces, self._about(now, stirred)) if stirred.any() else pose.pairs
+        else:
+            touched = (now != pose.looked).any(axis=1)[self.faces].any(axis=1)
+            kept = pose.pairs[~touched[pose.pairs].any(axis=1)]
+            pairs = np.concatenate([kept, intersections_of(now, self.faces, touched)]) if touched.any() else kept
+        pairs = pairs[self.asked[pairs].any(axis=1)]
+        pairs = pairs[~np.isin(self._keys(pairs), self._before)]
+        pose.looked, pose.pairs = now, pairs
+        fresh = pairs[~np.isin(self._keys(pairs), self._keys(pose.met))]
+        if len(fresh):
+            pose.met = np.concatenate([pose.met, fresh])
+            pose.senses = self._senses(now, pose)
+        return len(pairs)
+
+    def _about(self, now, stirred):
+        """(m,) bool: faces of vertices that are stirred or lie among those."""
+        low, high = now[stirred].min(axis=0) - _ABOUT_MM, now[stirred].max(axis=0) + _ABOUT_MM
+        return (stirred | ((now > low) & (now < high)).all(axis=1))[self.faces].any(axis=1)
+
+    def _folds(self, pose, field):
+        """Number of folded faces of a pose among those that the correction moves."""
+        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, field.any(axis=1)[self.faces].any(axis=1)))
+
+    def _flat(self, pose, field):
+        """(k, 3) what turns back faces of a pose that have been folded."""
+        if not len(pose.pairs):
+            return 0.0
+        now = pose.skin(field)
+        flat = laid_flat(self.rest, now, self.faces, np.ones(len(now)), rounds=_FLAT_ROUNDS)
+        return (flat - now) / np.maximum(pose.act, self.options.least_act)
+
+    def _ways(self, now, pairs):
+        """(k, 3) from the first face of each pair to the second, in the mean of what their corners look along."""
+        normals = vertex_normals(now, self.faces)
+        return normals[self.faces[pairs[:, 0]]].mean(axis=1) - normals[self.faces[pairs[:, 1]]].mean(axis=1)
+
+    def _flesh(self, now, pairs):
+        """(k,) winding number on either side of a crossing: 1 where two skins meet, 0 of a skin and its own lining."""
+        one, other = (now[self.faces[pairs[:, i]]] for i in (0, 1))
+        points = crossing_points(one, other) + self.options.aside_mm * normalized(self._ways(now, pairs))
+        return self._winding(now, points) + self._beyond[self.faces[pairs]].mean(axis=(1, 2))
+
+    def _senses(self, now, pose):
+        """(k,) of all pairs met: 1 where two skins meet, -1 where a skin has come through its own lining.
+
+        Pairs that hang together are one crossing and decide together, the first ones for all that come later. Where one
+        way out is much shorter than the other it is taken; else flesh decides.
+        """
+        known, corners = len(pose.senses), pose.met.ravel()
+        _, ends = np.unique(corners, return_inverse=True)
+        a, b = ends.reshape(-1, 2).T
+        count = ends.max() + 1
+        links = sp.coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+        label = connected_components(links, directed=False)[1][a]
+        votes = np.zeros(count)
+        np.add.at(votes, label[:known], pose.senses)
+        new = np.flatnonzero(votes[label[known:]] == 0.0)
+        pairs, mine = pose.met[known:][new], label[known:][new]
+        if len(new):
+            votes += self._votes(now, pairs, mine, count)
+        return np.append(pose.senses, np.where(votes > 0.0, 1.0, -1.0)[label[known:]])
+
+    def _votes(self, now, pairs, label, count):
+        """(count,) of each crossing: more than 0 where its pairs (k, 2), labelled (k,), are skins that meet."""
+        ways, (a, b) = normalized(self._ways(now, pairs)), self.faces[pairs.T]
+        votes, deep = np.zeros(count), np.zeros((2, count))
+        for most, way in zip(deep, (ways, -ways)):
+            np.maximum.at(most, label, overlap_along(now[a], now[b], way)[0])
+        for sign, (one, other) in ((1.0, deep), (-1.0, deep[::-1])):
+            votes[one < self.options.shorter * other] = sign
+        unsure = votes[label] == 0.0
+        if unsure.any():
+            flesh = np.clip(self._flesh(now, pairs[unsure]), 0.0, 1.0)
+            votes += np.bincount(label[unsure], flesh - 0.5, minlength=count)
+        return votes
+
+    def _winding(self, skin, points):
+        tree = igl.FastWindingNumberBVH()
+        tree.init(np.ascontiguousarray(skin), self.faces)
+        return np.asarray(tree.winding_number(np.ascontiguousarray(points))).reshape(-1)
+
+    def _apart(self, pose, field):
+        """(k, 3) what moves apart the faces that have crossed so far in a pose."""
+        start = now = pose.skin(field)
+        if not len(pose.pairs):
+            return np.zeros_like(field)
+        ways = self._ways(now, pose.met)
+        known = np.linalg.norm(ways, axis=1) > self.options.opposed
+        a, b = self.faces[pose.met[known].T]
+        ways = normalized(ways[known]) * pose.senses[known, None]
+        for _ in range(self.options.sweeps):
+            depth, at, there = overlap_along(now[a], now[b], ways)
+            hit = depth > -self.options.gap_mm
+            if not hit.any():
+                break
+            push = np.minimum(depth[hit] + self.options.gap_mm, self.options.most_mm)
+            at, there = at[hit], there[hit]
+            push /= (at**2).sum(axis=1) + (there**2).sum(axis=1)
+            corners = np.concatenate([a[hit], b[hit]])
+            share = np.concatenate([at, there])
+            step = np.concatenate([-push, push])[:, None] * np.tile(ways[hit], (2, 1))
+            total, count = np.zeros_like(now), np.zeros(len(now))
+            np.add.at(total, corners, share[..., None] * step[:, None])
+            np.add.at(count, corners, share)
+            now = now + total / np.maximum(count, 1.0)[:, None]
+        return (now - start) / np.maximum(pose.act, self.options.least_act)
+
+
+class _Pose:
+    """What is known of one pose: crossings now, and all pairs met with their senses."""
+
+    def __init__(self, vertices, act):
+        self._vertices, self.act = vertices, act
+        self.looked, self.pairs, self.met = None, np.empty((0, 2), np.int64), np.empty((0, 2), np.int64)
+        self.senses = np.empty(0)
+
+    def skin(self, field):
+        return self._vertices + self.act * field

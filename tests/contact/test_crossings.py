@@ -1,0 +1,63 @@
+"""Targets come out without crossings, halves too; sound shapes are left alone."""
+
+import numpy as np
+import pytest
+
+from facewright.contact import Targets, part_crossings
+from facewright.evaluate.synthetic import random_identity
+from facewright.mesh.intersect import self_intersections
+from facewright.rigging import unscanned_face
+from facewright.transfer.halves import left_share
+
+NAMES = ("mouthPressLeft", "mouthRollLower", "mouthSmileLeft")
+
+
+@pytest.fixture(scope="module")
+def face(hm08):
+    return unscanned_face(hm08, random_identity(hm08, 3))
+
+
+@pytest.fixture(scope="module")
+def targets(hm08, face):
+    """Shapes in which a strip of the lower lip is raised a little into the upper one."""
+    deltas = np.zeros((len(NAMES), *face.vertices.shape))
+    line = face.vertices[face.lines["lip_seam_lower"]]
+    middle = line[len(line) // 2]
+    near = np.exp(-(np.linalg.norm(face.vertices - middle, axis=1) ** 2) / 20.0)
+    lower = np.zeros(len(face.vertices), bool)
+    lower[: len(face.regions["lip_lower"])] = face.regions["lip_lower"]
+    deltas[1, :, 1] = 0.25 * near * lower
+    deltas[2, :, 2] = 3.0 * near
+    half = {"mouthRollLower@0.5": 0.5 * deltas[1]}
+    return Targets(NAMES, deltas, half, {"mouthRollLower": {0.5: "mouthRollLower@0.5"}})
+
+
+def new_crossings(face, delta):
+    skin = face.template.skin
+    V, F = face.vertices[skin.vertex_slice], face.template.faces[skin.face_slice]
+    asked = face.regions["face"][skin.vertex_slice][F].all(axis=1)
+    pairs = [self_intersections(V + motion, F) for motion in (0.0, delta[skin.vertex_slice])]
+    before, after = ({tuple(pair) for pair in found[asked[found].any(axis=1)]} for found in pairs)
+    return len(after - before)
+
+
+def test_crossings_go_and_the_in_between_follows(face, targets):
+    assert new_crossings(face, targets.deltas[1]) > 10
+    parted = part_crossings(face, targets)
+    left = left_share(face.template)[:, None]
+    assert [new_crossings(face, share * parted.deltas[1]) for share in (1.0, left, 1.0 - left)] == [0, 0, 0]
+    change = parted.deltas[1] - targets.deltas[1]
+    assert np.abs(change).max() < 0.5
+    half = parted.extras["mouthRollLower@0.5"] - targets.extras["mouthRollLower@0.5"]
+    assert np.allclose(half, 0.5 * change)
+
+
+def test_shapes_that_do_not_cross_are_left_alone(face, targets):
+    parted = part_crossings(face, targets)
+    assert np.array_equal(parted.deltas[0], targets.deltas[0])
+    assert np.array_equal(parted.deltas[2], targets.deltas[2])
+
+
+def test_the_result_does_not_depend_on_threads(face, targets):
+    one, two = (part_crossings(face, targets, jobs) for jobs in (1, 2))
+    assert np.array_equal(one.deltas, two.deltas)

@@ -1,0 +1,79 @@
+"""Sheets that cross are moved apart by little, and what does not cross stays."""
+
+import numpy as np
+import pytest
+
+from facewright.contact.parting import Parting
+from facewright.mesh.folds import folded_by_shape
+from facewright.mesh.intersect import self_intersections
+
+
+@pytest.fixture(scope="module")
+def pads():
+    """Two closed pads, one above the other with air between; (vertices, faces, upper (n,) bool)."""
+    n = 13
+    x, y = np.meshgrid(np.linspace(-6, 6, n), np.linspace(-6, 6, n))
+    index = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (index[i : n - 1 + i, j : n - 1 + j].ravel() for i, j in ((0, 0), (0, 1), (1, 1), (1, 0)))
+    top = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    ring = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+    after, m = np.roll(ring, -1), n * n
+    sides = np.concatenate([np.stack([ring, ring + m, after], 1), np.stack([after, ring + m, after + m], 1)])
+    pad = np.concatenate([top, top[:, ::-1] + m, sides])
+    flat = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+    lower = np.concatenate([flat + [0, 0, -1.0], flat + [0, 0, -4.0]])
+    # Vertices of the two do not lie above each other.
+    upper = np.concatenate([flat + [0.4, 0.3, 4.0], flat + [0.4, 0.3, 1.0]])
+    return np.concatenate([lower, upper]), np.concatenate([pad, pad + 2 * m]), np.arange(4 * m) >= 2 * m
+
+
+@pytest.fixture(scope="module")
+def parting(pads):
+    V, F, _ = pads
+    every = np.ones(len(F), bool)
+    return Parting(V, F, every, every, np.full(len(V), 0.5))
+
+
+def pressed(pads, by):
+    """The upper pad lowered until its rounded underside lies so deep in the lower one."""
+    V, _, upper = pads
+    pose = V.copy()
+    pose[upper, 2] -= 2.0 + by
+    round_off = 0.02 * (V[:, 0] ** 2 + V[:, 1] ** 2)
+    pose[upper, 2] += round_off[upper]
+    return pose
+
+
+def test_what_does_not_cross_stays(pads, parting):
+    V, _, _ = pads
+    assert not parting([V], [1.0]).any()
+    assert not parting([pressed(pads, -0.1)], [1.0]).any()
+
+
+def test_pads_in_each_other_come_apart_by_little(pads, parting):
+    V, F, upper = pads
+    pose = pressed(pads, 0.1)
+    assert len(self_intersections(pose, F))
+    field = parting([pose], [1.0])
+    assert not len(self_intersections(pose + field, F))
+    assert not len(folded_by_shape(V, pose + field, F))
+    assert 0.02 < np.abs(field).max() < 0.15
+    assert field[upper, 2].max() > 0.02 and field[~upper, 2].min() < -0.02  # both give way, each to its own side
+
+
+def test_a_shape_and_its_half_are_parted_together(pads, parting):
+    V, F, _ = pads
+    share = np.clip(0.5 + V[:, :1] / 8.0, 0.0, 1.0)
+    motion = pressed(pads, 0.08) - V
+    poses, acts = [V + motion, V + share * motion], [1.0, share]
+    field = parting(poses, acts)
+    left = [len(self_intersections(pose + act * field, F)) for pose, act in zip(poses, acts)]
+    assert left == [0, 0]
+
+
+def test_no_vertex_goes_farther_than_it_may(pads):
+    V, F, upper = pads
+    every = np.ones(len(F), bool)
+    parting = Parting(V, F, every, every, np.where(upper, 0.5, 0.01))
+    field = parting([pressed(pads, 0.1)], [1.0])
+    assert np.linalg.norm(field[~upper], axis=1).max() < 0.01 + 1e-9
