@@ -36,6 +36,7 @@ class EarOptions:
     better, left_mm, covered  an ear is believed whose distances from the scan's, both ways, fall to this share and to
                this mean, and of which the scan shows this share: hair beside an ear that fits stands out of the head
                too, and would lead it away
+    shown_mm   an ear is shown by the scan if it lies this near to it, and covered
     """
 
     out_mm: tuple[float, float] = (4.0, 6.0)
@@ -51,6 +52,7 @@ class EarOptions:
     better: float = 0.85
     left_mm: float = 2.5
     covered: float = 0.6
+    shown_mm: float = 1.5
 
 
 class _Pairs(NamedTuple):
@@ -80,6 +82,25 @@ def ear_motion(vertices, faces, ears, target, options=None):
             motion = scale * vertices[led] @ R.T + t - vertices[led]
             result += spread_smoothly(vertices, faces, led, motion, free, options.blend_mm / 2)
     return result
+
+
+def hidden_ears(vertices, faces, ears, target, options=None):
+    """(n,) bool: ears that the scan does not show. Under hair a model that gives way would shrink them into it.
+
+    As for ear_motion. Mean distance of a model without fine modes from the scan, two scans and eight made heads of each
+    template: 0.2 to 1.2 mm where the ear can be seen, 1.7 to 3.7 under hair.
+    """
+    options = options or EarOptions()
+    hidden = np.zeros(len(vertices), bool)
+    normals = vertex_normals(vertices, faces)
+    for mask in ears:
+        match = target.match(
+            vertices[mask], normals[mask], max_distance=options.far_mm, max_angle_deg=options.angle_deg
+        )
+        met = match.weights > 0
+        shown = met.mean() > options.covered and match.distance[met].mean() < options.shown_mm
+        hidden |= mask & (not shown)
+    return hidden
 
 
 class _Ear:

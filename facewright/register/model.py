@@ -63,12 +63,13 @@ class Expressions:
     std: np.ndarray
 
 
-def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks, options):
+def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks, options, doubt):
     """Fit the model to a scan.
 
     mean (n, 3), basis localize.LocalizedBasis, expressions Expressions, faces (m, 3)
     weights (n,) trust in each vertex, 0 leaves it out; rules: skin.SkinRules; target: correspond.Target
     landmarks: points (l, 3) on the scan, scipy sparse (l, n) that takes template vertices to them, weights (l,)
+    doubt: function of the vertices (n, 3) that the coarse modes found -> (n,) bool: left out by the fine ones
     returns ModelFit
     """
     landmark_points, landmark_rows, landmark_weights = landmarks
@@ -86,6 +87,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
         state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
     for iteration in range(options.iterations):
         if iteration == options.iterations - options.fine_iterations:
+            areas *= ~doubt(state.vertices())[sampled]
             state.refine(basis)
             information = options.fine_n_effective / options.fine_sigma_mm**2
             landmark_model = _project(landmark_rows, mean, basis, deltas)

@@ -13,7 +13,7 @@ from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
 from facewright.mesh.untangle import reshaped, unfolded, untangled
 from facewright.register.correspond import Target
-from facewright.register.ears import ear_motion
+from facewright.register.ears import ear_motion, hidden_ears
 from facewright.register.interior import tuck_interior
 from facewright.register.leading import leading_lines
 from facewright.register.localize import localized_basis
@@ -78,6 +78,8 @@ def register(scan, landmarks, template, options=None, placed=()):
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
+    hidden = _hidden_ears(template, target, model.vertices)[:stop]
+    rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
     levels = LEVELS if edge_mm > FACETS_MM else LEVELS + DETAIL
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
     interior, outer, led = _interior(template)
@@ -147,17 +149,36 @@ def _fit_model(template, target, pairs, closed, options):
     landmarks = (pairs.points, pairs.rows, pairs.weights)
     mean, basis = template.vertices, template.identity_basis
     local = localized_basis(mean, basis, template.regions["face"], template.regions["outer"])
-    model = fit_model(mean, local, expressions, *common, landmarks, options)
-    return refine_model(model, mean, basis, *common), names
+
+    def hidden(vertices):
+        return _hidden_ears(template, target, vertices)
+
+    model = fit_model(mean, local, expressions, *common, landmarks, options, hidden)
+    seen = np.where(hidden(model.vertices), 0.0, trust)
+    return refine_model(model, mean, basis, faces, seen, rules, target), names
 
 
 def _with_ears(template, target, model):
     """The ModelFit with ears where and as large as the scan's."""
     stop = template.skin.vertices[1]
-    ears = [template.regions[f"ear_{side}"][:stop] for side in SIDES]
     motion = np.zeros_like(model.vertices)
-    motion[:stop] = ear_motion(model.vertices[:stop], template.faces[template.skin.face_slice], ears, target)
+    faces, ears = template.faces[template.skin.face_slice], _ears(template)
+    motion[:stop] = ear_motion(model.vertices[:stop], faces, ears, target)
     return replace(model, vertices=model.vertices + motion, rest=model.rest + motion)
+
+
+def _hidden_ears(template, target, vertices):
+    """(n,) bool: vertices (n, 3) of ears that the scan does not show."""
+    stop = template.skin.vertices[1]
+    hidden = np.zeros(len(vertices), bool)
+    faces = template.faces[template.skin.face_slice]
+    hidden[:stop] = hidden_ears(vertices[:stop], faces, _ears(template), target)
+    return hidden
+
+
+def _ears(template):
+    """Masks (n,) of the skin's ears."""
+    return [template.regions[f"ear_{side}"][: template.skin.vertices[1]] for side in SIDES]
 
 
 def _unfolded(template, skin, faces, matches):
