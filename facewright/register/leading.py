@@ -39,7 +39,7 @@ def leading_lines(scan, template, model, pairs, closed):
             np.full(pairs.by_hand.sum(), PLACED_ROW_WEIGHT),
         )
         leading.append(_always(rows))
-    rows, found = _lip_rows(scan, template, model, normals, darkness)
+    rows, found = _lip_rows(scan, template, model, pairs, normals, darkness)
     leading, stats = leading + rows, stats | found
     led = set(LIPS_INNER) if found["lips_closed"] else set()
     for side in closed:
@@ -74,13 +74,14 @@ def _landmark_rows(pairs, stop, led):
     return rows
 
 
-def _lip_rows(scan, template, model, normals, darkness):
+def _lip_rows(scan, template, model, pairs, normals, darkness):
     """Rows that draw the lip seam onto the crease and keep the lips in contact, if there is one; and its figures."""
     stop = len(normals)
     upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
     middle = 0.5 * (model.vertices[upper] + model.vertices[lower])
     forward = normals[template.regions["lips"][:stop]].mean(axis=0)
-    crease = trace_crease(scan.vertices, scan.faces, middle, forward, CreaseOptions(), darkness)
+    line = _led_by_lips(middle, model, pairs)
+    crease = trace_crease(scan.vertices, scan.faces, line, forward, CreaseOptions(), darkness)
     stats = {"lips_closed": crease.found, "lip_crease_mm": float(np.median(crease.strength))}
     if not crease.found:
         return [], stats
@@ -89,6 +90,19 @@ def _lip_rows(scan, template, model, normals, darkness):
     rest = CONTACT_SHARE * (template.vertices[upper] - template.vertices[lower])
     contact = contact_rows(upper[1:-1], lower[1:-1], rest[1:-1], CONTACT_WEIGHT, stop)
     return [line_rows(upper, crease, trust, stop), line_rows(lower, crease, trust, stop), _always(contact)], stats
+
+
+def _led_by_lips(line, model, pairs):
+    """The model's line between the lips (k, 3), moved across and tilted by what the landmarks along it are off.
+
+    On a coarse scan with hair the model's was 4 mm below the crease at one end, and the crease found 0.9 mm off.
+    """
+    inner = np.isin(pairs.names, [f"mp{number}" for number in LIPS_INNER])
+    if inner.sum() < 4:
+        return line
+    here = pairs.rows[inner] @ model.vertices
+    tilt, shift = np.polyfit(here[:, 0], (pairs.points[inner] - here) * [0.0, 1.0, 1.0], 1)
+    return line + line[:, :1] * tilt + shift
 
 
 def _lid_crease(scan, template, model, pairs, normals, darkness, side):

@@ -45,7 +45,7 @@ class CreaseOptions:
     step_mm: float = 0.2
     overshoot_mm: float = 4.0
     widths_mm: tuple[float, ...] = (0.6, 1.0, 1.6)
-    prior_sigma_mm: float = 2.5
+    prior_sigma_mm: float = 3.5
     bend_weight: float = 0.5
     min_strength_mm: float = 0.04
 
