@@ -2,9 +2,9 @@
 
 The displacement of the template in its own frame is a Gaussian process with the covariance
 
-    K(x, y) = (1 - share) C(x, y) + share C(x, y) k(x, y; length) + fine^2 k(x, y; fine length) I + similarity
+    K(x, y) = (1 - share) C(x, y) + share C(x, y) k(x, y) + fine^2 k(x, y) I + similarity
 
-with C = sum_i b_i(x) b_i(y)' of the identity modes and k(x, y; l) = exp(-|x - y|^2 / (2 l^2)): the same variation,
+with C = sum_i b_i(x) b_i(y)' of the identity modes and k(x, y) = exp(-|x - y|^2 / (2 length^2)): the same variation,
 allowed to differ from place to place, and a little that is like no mode (Luethi, Gerig, Jud and Vetter, Gaussian
 process morphable models, 2018, sections 3.2 and 3.4). A surface is only seen along its normal: how far a vertex slid
 along it the prior decides. It is not cut to some modes: for a thousand points of the surface the exact posterior is a
@@ -31,8 +31,7 @@ import scipy.linalg
 from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import vertex_normals
 
-SHARE, LENGTH_MM = 0.2, 30.0
-FINE_MM, FINE_LENGTH_MM = 1.5, 25.0
+SHARE, FINE_MM, LENGTH_MM = 0.2, 1.5, 25.0
 SIMILARITY_MM = 30.0
 SAMPLES, ROUNDS = 900, 5
 REACH_MM, TAU_MM = 6.0, 2.0
@@ -106,9 +105,9 @@ def _sampled(weights):
     return rows[:: max(1, len(rows) // SAMPLES)]
 
 
-def _kernel(a, b, length_mm):
+def _kernel(a, b):
     """(j, k) of points a (j, 3) and b (k, 3), in single precision: the exponentials take the time."""
-    a, b = (points.astype(np.float32) / (np.sqrt(2.0, dtype=np.float32) * np.float32(length_mm)) for points in (a, b))
+    a, b = (points.astype(np.float32) / (np.sqrt(2.0, dtype=np.float32) * np.float32(LENGTH_MM)) for points in (a, b))
     result = 2.0 * (a @ b.T)
     result -= (a**2).sum(axis=1)[:, None]
     result -= (b**2).sum(axis=1)
@@ -127,12 +126,11 @@ def _covariance(sites):
     """(3k, 3k) of the displacements at k sites."""
     k = len(sites.points)
     flat = sites.modes.reshape(len(sites.modes), -1)
-    local = 1.0 - SHARE + SHARE * _kernel(sites.points, sites.points, LENGTH_MM)
+    near = _kernel(sites.points, sites.points)
     K = (flat.T @ flat).reshape(k, 3, k, 3)
-    K *= local[:, None, :, None]
-    fine = FINE_MM**2 * _kernel(sites.points, sites.points, FINE_LENGTH_MM)
+    K *= (1.0 - SHARE + SHARE * near)[:, None, :, None]
     for axis in range(3):
-        K[:, axis, :, axis] += fine
+        K[:, axis, :, axis] += FINE_MM**2 * near
     similar = _similarity(sites.points).reshape(7, -1)
     K = K.reshape(3 * k, 3 * k)
     K += similar.T @ similar
@@ -147,9 +145,9 @@ def _along(K, sites, directions):
 def _displacement(points, basis, sites, forces):
     """(n, 3) the posterior at points (n, 3) with modes (i, n, 3), by what forces (k, 3) the sites were moved."""
     shares = np.einsum("ikc,kc->ik", sites.modes, forces)  # (i, k)
-    local = _kernel(points, sites.points, LENGTH_MM) @ shares.T.astype(np.float32)  # (n, i)
-    local = SHARE * local + (1.0 - SHARE) * shares.sum(axis=1)
+    near = _kernel(points, sites.points)
+    local = SHARE * (near @ shares.T.astype(np.float32)) + (1.0 - SHARE) * shares.sum(axis=1)  # (n, i)
     result = np.einsum("ni,inc->nc", local, basis, optimize=True)
-    result += FINE_MM**2 * _kernel(points, sites.points, FINE_LENGTH_MM) @ forces.astype(np.float32)
+    result += FINE_MM**2 * near @ forces.astype(np.float32)
     similar = np.einsum("gkc,kc->g", _similarity(sites.points), forces)
     return result + np.tensordot(similar, _similarity(points), 1)

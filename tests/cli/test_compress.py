@@ -336,7 +336,8 @@ def test_a_summary_that_cannot_be_written_is_one_sentence(tmp_path, command):
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_a_killed_run_leaves_no_index_and_the_next_one_cleans_up(tmp_path, command):
     out = tmp_path / "packed"
-    code = "import sys, time\nfrom facewright.compress import folder\nreal = folder._Store.text\n"
+    code = "import signal, sys, time\nfrom facewright.compress import folder\nreal = folder._Store.text\n"
+    code += "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"  # where the tests themselves run under nohup
     code += "folder._Store.text = lambda self, *a: (real(self, *a), print('written', flush=True), time.sleep(60))\n"
     code += "from facewright.cli.__main__ import main\nsys.exit(main(sys.argv[1:]))\n"
 
