@@ -35,8 +35,8 @@ SHARE, FINE_MM, LENGTH_MM = 0.2, 1.5, 25.0
 SIMILARITY_MM = 30.0
 SAMPLES, ROUNDS = 900, 5
 REACH_MM, TAU_MM = 6.0, 2.0
-SIGMA_MM, N_EFFECTIVE = 0.5, 600.0
-"""What the process cannot explain, and how many independent observations the scan counts as."""
+SIGMA_MM, N_EFFECTIVE, N_FACETS = 0.5, 600.0, 200.0
+"""What the process cannot explain, and how many independent observations a scan counts as, and one of facets."""
 BELIEF = 0.6
 """Of the two priors, the process and the localised modes before it, neither is known to be the true one."""
 
@@ -49,15 +49,15 @@ class _Sites:
     modes: np.ndarray
 
 
-def refine_model(model, mean, basis, faces, weights, rules, target):
+def refine_model(model, mean, basis, faces, weights, rules, target, finely=True):
     """The ModelFit with vertices and rest told anew, see above; all else is kept as it was found.
 
-    model ModelFit; the rest as for fit_model, with basis (i, n, 3) the template's own
+    model ModelFit; the rest as for fit_model, with basis (i, n, 3) the template's own; finely: the scan has no facets
     """
     frame = _Frame(model.T)
     sampled = _sampled(weights)
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
-    areas *= N_EFFECTIVE / SIGMA_MM**2 / areas.sum()
+    areas *= (N_EFFECTIVE if finely else N_FACETS) / SIGMA_MM**2 / areas.sum()
     normals = vertex_normals(model.vertices, faces)[sampled]
     sites = _Sites(mean[sampled], basis[:, sampled])
     covariance = _covariance(sites)

@@ -52,8 +52,9 @@ class RegisterOptions:
 # lower final stiffness gains distance and loses correspondence, so the last levels only take up the scan's detail.
 LEVELS = tuple((w, w / 2, 3.0, 10.0) for w in (45.0, 20.0, 10.0, 5.0))
 DETAIL = ((2.0, 0.5, 1.5, 4.0),)
-# Facets are no detail: a scan cut to 3,000 triangles (edges of 11 mm) lands 0.48 mm from the full one without the last
-# level, 0.51 with. A scan with edges of 4.6 mm needs it: its lip seam is 0.9 mm off without, 0.5 with.
+# Facets are no detail: a scan cut to 3,000 triangles (edges of 11 mm) lands 0.58 mm from the full one with all modes
+# and as many observations as a fine scan, 0.50 with the coarse modes and fewer. The last level makes it worse by 0.03.
+# A scan with edges of 4.6 mm needs that: its lip seam is 0.9 mm off without, 0.5 with.
 FACETS_MM = 8.0
 
 
@@ -73,7 +74,8 @@ def register(scan, landmarks, template, options=None, placed=()):
     pairs = landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
     edge_mm = face_edge_mm(scan.vertices, scan.faces)
-    model, names = _fit_model(template, target.smoothed(edge_mm), pairs, closed, options.model)
+    finely = edge_mm <= FACETS_MM
+    model, names = _fit_model(template, target.smoothed(edge_mm), pairs, closed, options.model, finely)
     model = _with_ears(template, target, model)
     leading, line_stats = leading_lines(scan, template, model, pairs, closed)
     stop = template.skin.vertices[1]
@@ -81,7 +83,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
     hidden = _hidden_ears(template, target, model.vertices)[:stop]
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
-    levels = LEVELS if edge_mm > FACETS_MM else LEVELS + DETAIL
+    levels = LEVELS + DETAIL if finely else LEVELS
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
     interior, outer, led = _interior(template)
     skin = _unfolded(template, skin, faces, matches)
@@ -136,7 +138,7 @@ def _expressions(template, closed):
     return names, Expressions(deltas, expected, np.array([SMILE_STD] + [SHUT_STD] * len(lids)))
 
 
-def _fit_model(template, target, pairs, closed, options):
+def _fit_model(template, target, pairs, closed, options, finely):
     names, expressions = _expressions(template, closed)
     stop = template.skin.vertices[1]
     rules = skin_rules(template)
@@ -150,13 +152,14 @@ def _fit_model(template, target, pairs, closed, options):
     landmarks = (pairs.points, pairs.rows, pairs.weights)
     mean, basis = template.vertices, template.identity_basis
     local = localized_basis(mean, basis, template.regions["face"], template.regions["outer"])
+    local = local if finely else local.first(options.coarse_modes)
 
     def hidden(vertices):
         return _hidden_ears(template, target, vertices)
 
     model = fit_model(mean, local, expressions, *common, landmarks, options, hidden)
     seen = np.where(hidden(model.vertices), 0.0, trust)
-    return refine_model(model, mean, basis, faces, seen, rules, target), names
+    return refine_model(model, mean, basis, faces, seen, rules, target, finely), names
 
 
 def _with_ears(template, target, model):
