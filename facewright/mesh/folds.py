@@ -94,21 +94,6 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
     return result
 
 
-def turned_to(vertices, faces, normals, mobility, *, share=_LEAST_SHARE, rounds=60):
-    """Vertices (n, 3) of which faces that look away from where they should are turned, moving as little as that takes.
-
-    normals (m, 3) unit, zero where nothing is known; mobility (n,) 0..1; share of its area that each face shows
-    """
-    asked = np.flatnonzero(normals.any(axis=1))
-    least = share * face_areas(vertices, faces[asked])
-    for _ in range(rounds):
-        way = _way_back(vertices, faces[asked], normals[asked], least, mobility)
-        if way is None:
-            break
-        vertices = vertices + way
-    return vertices
-
-
 def _shortened(vectors, longest):
     """Rows of vectors no longer than that."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)

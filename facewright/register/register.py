@@ -8,7 +8,6 @@ import numpy as np
 
 from facewright.data import Face
 from facewright.mesh.adjacency import dilate
-from facewright.mesh.folds import turned_to
 from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
@@ -195,7 +194,7 @@ def _unfolded(template, skin, faces, matches):
     for name, line in template.lines.items():
         if name.startswith(LED_LINES):
             keep[line] = True
-    return turned_to(unfolded(skin, faces, expected, keep), faces, expected, (~keep).astype(float))
+    return unfolded(skin, faces, expected, keep)
 
 
 def _without_knots(template, skin, faces):
