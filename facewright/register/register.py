@@ -31,7 +31,7 @@ SIDES = {"left": "Left", "right": "Right"}
 # How far a smile strays from rest, and shut lids from the template's blink.
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
-# Rings of vertices around a knot in which everything gives way, tried in turn.
+# Rings of vertices around a knot in which everything gives way, or takes the template's shape, tried in turn.
 GIVING_WAY, RESHAPED = (0, 1, 2, 3), (2, 3, 4, 5)
 FOLD_MM = 3.0  # a face is only held to look as the scan does where the scan is this near
 PLAINLY_OPEN = 0.4  # several times what matters (Target.MIN_OPENNESS)
@@ -185,7 +185,7 @@ def _ears(template):
 
 
 def _unfolded(template, skin, faces, matches):
-    """Skin (n, 3) without faces of the lips that look away from the scan, as in the groove at a corner."""
+    """Skin (n, 3) without faces of lips and lids that look away from the scan, as in the groove at a corner."""
     n = len(skin)
     grooves = (template.regions["lips"] | template.regions["eyes"]) & template.regions["outer"]
     asked = grooves[:n] & (matches.distance < FOLD_MM)
