@@ -76,7 +76,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     coarse = basis.first(options.coarse_modes)
     state = _State(mean, coarse, expressions)
     deltas = expressions.deltas
-    sampled = _sample_rows(mean, faces, weights)
+    sampled = sample_rows(weights, SAMPLES)
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
     areas /= areas.sum()
     information = options.n_effective / options.sigma_mm**2
@@ -115,8 +115,8 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     return ModelFit(vertices, rest, state.alpha, state.expression, state.T(), rms)
 
 
-def _sample_rows(mean, faces, weights, count=SAMPLES):
-    """Trusted vertices, thinned evenly to about count."""
+def sample_rows(weights, count):
+    """Indices of trusted vertices (weights (n,) above 0), thinned evenly to about count."""
     rows = np.flatnonzero(weights > 0)
     return rows[:: max(1, len(rows) // count)]
 

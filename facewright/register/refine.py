@@ -30,6 +30,7 @@ import scipy.linalg
 
 from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import vertex_normals
+from facewright.register.model import sample_rows
 
 SHARE, FINE_MM, LENGTH_MM = 0.2, 1.5, 25.0
 SIMILARITY_MM = 30.0
@@ -55,7 +56,7 @@ def refine_model(model, mean, basis, faces, weights, rules, target, finely=True)
     model ModelFit; the rest as for fit_model, with basis (i, n, 3) the template's own; finely: the scan has no facets
     """
     frame = _Frame(model.T)
-    sampled = _sampled(weights)
+    sampled = sample_rows(weights, SAMPLES)
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
     areas *= (N_EFFECTIVE if finely else N_FACETS) / SIGMA_MM**2 / areas.sum()
     normals = vertex_normals(model.vertices, faces)[sampled]
@@ -97,12 +98,6 @@ class _Frame:
 
     def turned_inward(self, directions):
         return directions @ self.R
-
-
-def _sampled(weights):
-    """Trusted vertices, thinned evenly."""
-    rows = np.flatnonzero(weights > 0)
-    return rows[:: max(1, len(rows) // SAMPLES)]
 
 
 def _kernel(a, b):
