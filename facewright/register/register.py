@@ -14,7 +14,6 @@ from facewright.mesh.openness import vertex_openness
 from facewright.mesh.untangle import reshaped, unfolded, untangled
 from facewright.register.correspond import Target
 from facewright.register.ears import ear_motion, hidden_ears
-from facewright.register.interior import tuck_interior
 from facewright.register.leading import leading_lines
 from facewright.register.localize import localized_basis
 from facewright.register.model import Expressions, ModelOptions, fit_model
@@ -84,17 +83,17 @@ def register(scan, landmarks, template, options=None, placed=()):
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
     levels = LEVELS + DETAIL if finely else LEVELS
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
-    interior, outer, led = _interior(template)
-    skin = _unfolded(template, skin, faces, matches)
+    skin = _unfolded(template, skin, faces, matches, "lips")
     fit = model.vertices.copy()
-    fit[:stop] = _without_knots(template, tuck_interior(skin, faces, interior, outer, led), faces)
+    fit[:stop] = _without_knots(template, _unfolded(template, skin, faces, matches, "eyes"), faces)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
-        rest, removed = take_out_expression(template, model, fit[:stop], expression)
+        # What mends the rims of shut lids crumples them once they are open.
+        rest, removed = take_out_expression(template, model, skin, expression)
         if removed:
             neutral = model.rest.copy()
-            neutral[:stop] = _without_knots(template, tuck_interior(rest, faces, interior, outer, led), faces)
+            neutral[:stop] = _without_knots(template, rest, faces)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
@@ -184,11 +183,10 @@ def _ears(template):
     return [template.regions[f"ear_{side}"][: template.skin.vertices[1]] for side in SIDES]
 
 
-def _unfolded(template, skin, faces, matches):
-    """Skin (n, 3) without faces of lips and lids that look away from the scan, as in the groove at a corner."""
+def _unfolded(template, skin, faces, matches, region):
+    """Skin (n, 3) without faces of a region that look away from the scan, as in the groove at a corner of the mouth."""
     n = len(skin)
-    grooves = (template.regions["lips"] | template.regions["eyes"]) & template.regions["outer"]
-    asked = grooves[:n] & (matches.distance < FOLD_MM)
+    asked = (template.regions[region] & template.regions["outer"])[:n] & (matches.distance < FOLD_MM)
     expected = normalized(matches.normals[faces].sum(axis=1)) * asked[faces].all(axis=1)[:, None]
     keep = np.zeros(n, bool)
     for name, line in template.lines.items():
@@ -252,12 +250,3 @@ def _hidden(rules, observed):
     hidden = np.zeros(len(observed), bool)
     hidden[: len(rules.hairy)] = rules.hairy & ~observed[: len(rules.hairy)]
     return hidden
-
-
-def _interior(template):
-    """(n_skin,) bool insides of mouth, sockets and nostrils and outer skin, indices of lip and lid lines."""
-    stop = template.skin.vertices[1]
-    names = ("mouth_interior", "socket_left", "socket_right", "nostrils")
-    outer = template.regions["outer"][:stop]
-    led = np.concatenate([line for name, line in template.lines.items() if name.startswith(LED_LINES)])
-    return np.any([template.regions[name][:stop] for name in names], axis=0) & ~outer, outer, led
