@@ -3,8 +3,9 @@
     python bench/shapes.py [--template hm08 ict] [--heads 20] [--blends 1000] [--only NAME ...] [--fresh] [--json FILE]
 
 Heads: the template itself, the embedded sample and the real scans beside the project (registered once, then kept under
-bench/cache; --fresh registers again), and --heads random people of the template's identity modes, which are faces
-without a registration. Figures are those of `facewright evaluate rig`; the random people share the blends.
+bench/cache until the code of registration changes; --fresh registers again), and --heads random people of the
+template's identity modes, which are faces without a registration. Figures are those of `facewright evaluate rig`; the
+random people share the blends.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ import argparse
 import json
 import time
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 from cases import find_benchmark_template, fingerprint
 from common import CACHE, SCANS, peak_memory_mb, print_table
 from threadpoolctl import threadpool_limits
 
+import facewright
 from facewright.cli.evaluate import print_rows
 from facewright.evaluate.bars import rig_rows
 from facewright.evaluate.rows import Row, worst_rows
@@ -38,7 +41,8 @@ REAL = {"lee-perry-smith": "lee-perry-smith/head.obj", "menpo-james": "menpo-jam
 
 def registered(template, path, fresh):
     """The Face of a scan, from the cache if it is there."""
-    cached = CACHE / f"face-{template.info['name']}-{path.parent.name}-{fingerprint(template, path.name)}.npz"
+    digest = fingerprint(template, path.name, *_registering_code())
+    cached = CACHE / f"face-{template.info['name']}-{path.parent.name}-{digest}.npz"
     info = cached.with_suffix(".json")
     if fresh or not (cached.is_file() and info.is_file()):
         scan, _ = clean_scan(read_scan(path))
@@ -49,6 +53,12 @@ def registered(template, path, fresh):
         info.write_text(json.dumps(told, default=float))
     with np.load(cached) as arrays:
         return unpack_face(dict(arrays), json.loads(info.read_text()), template)
+
+
+def _registering_code():
+    """The sources that a registered face depends on."""
+    folders = (Path(facewright.__file__).parent / name for name in ("read", "scan", "register", "mesh", "solve"))
+    return [path.read_text() for folder in folders for path in sorted(folder.rglob("*.py"))]
 
 
 def rigged(face, seconds):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.contact.parting import Parting
 from facewright.contact.targets import is_even
+from facewright.contact.teeth import out_of_teeth, rows_of_teeth
 from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
 from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
@@ -41,6 +43,7 @@ class _Crossings:
     def __init__(self, face, targets):
         template = face.template
         self.at = template.skin.vertex_slice
+        self.rest, self.teeth = face.vertices, rows_of_teeth(template, face.vertices)
         self.V, faces = face.vertices[self.at], template.faces[template.skin.face_slice]
         asked = face.regions["face"][self.at][faces].all(axis=1)
         farthest = np.where(face.regions["outer"][self.at], _SEEN_MM, _HIDDEN_MM)
@@ -60,9 +63,10 @@ class _Crossings:
 
     def _apart(self, motions, acts):
         """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say."""
-        motions = [motion[self.at] for motion in motions]
-        far = max(np.abs(motion).max(initial=0.0) for motion in motions) > _FAR_MM
-        return (self.wide if far else self.near)([self.V + motion for motion in motions], acts)
+        heads = [self.rest + motion for motion in motions]
+        far = max(np.abs(motion[self.at]).max(initial=0.0) for motion in motions) > _FAR_MM
+        ways_out = [partial(out_of_teeth, self.teeth, head) for head in heads]
+        return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out)
 
     def with_shapes(self, targets, run):
         """Targets whose shapes have no crossings, nor the halves of those that have any."""

@@ -6,17 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from facewright.contact.teeth import out_of_teeth, rows_of_teeth
 from facewright.mesh.folds import laid_flat
 from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
 
 SEAM_MOBILITY = 0.2  # of the line where the lips meet
 _MOVES_MM = 1e-3
+_ROUNDS = 4  # of laying flat and keeping out of the teeth in turn
 
 
 def lay_flat(face, targets):
     """Targets in which no face of the skin outside the inner mouth is folded, in-betweens and correctives included.
 
     face  data.Face; a corrective is looked at with its drivers at 1, mouthClose with jawOpen
+    What has been laid flat stays out of the teeth.
     """
     skin = face.template.skin
     at = skin.vertex_slice
@@ -31,14 +34,24 @@ def lay_flat(face, targets):
         elif name.startswith("lid_") or name == "neck_ring":
             ease[line] = 0.0
 
+    teeth = rows_of_teeth(face.template, face.vertices)
+
     def flat(name):
         delta = targets.delta(name)
-        pose = delta[at] + sum(targets.delta(other)[at] for other in _beneath(name, targets))
-        near = faces[(np.abs(pose) > _MOVES_MM).any(axis=1)[faces].any(axis=1)]
-        moved = V + pose
-        result = laid_flat(V, moved, near, ease)
-        if result is moved:
-            return delta
+        pose = delta + sum(targets.delta(other) for other in _beneath(name, targets))
+        near = faces[(np.abs(pose[at]) > _MOVES_MM).any(axis=1)[faces].any(axis=1)]
+        moved = V + pose[at]
+        result = moved
+        for _ in range(_ROUNDS):
+            before, result = result, laid_flat(V, result, near, ease)
+            changed = np.flatnonzero((result != moved).any(axis=1))
+            if result is before or not len(changed):
+                break
+            way = out_of_teeth(teeth, face.vertices + pose, result[changed])
+            if not way.any():
+                break
+            result = np.array(result)
+            result[changed] += way
         delta = delta.copy()
         delta[at] += result - moved
         return delta

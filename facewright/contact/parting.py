@@ -65,13 +65,15 @@ class Parting:
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
         self._beyond = -self._winding(self.rest, outside)
 
-    def __call__(self, poses, acts):
+    def __call__(self, poses, acts, ways_out):
         """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
 
         poses  sequence of (n, 3); acts: how strongly the correction acts in each, a number or (n, 1)
+        ways_out  for each a function of points (k, 3): their ways (k, 3) out of what skin must not enter
         """
         field = np.zeros_like(self.rest)
-        poses = [_Pose(pose[self.used], self._cut(act)) for pose, act in zip(poses, acts)]
+        asked = zip(poses, acts, ways_out)
+        poses = [_Pose(pose[self.used], self._cut(act), way_out) for pose, act, way_out in asked]
         best, fewest, waited = field, np.inf, 0
         while waited < self.options.patience:
             left = sum(self._look(pose, field) for pose in poses)
@@ -84,6 +86,7 @@ class Parting:
             for pose in poses:
                 field = self._within(field + self._apart(pose, field))
                 field = self._within(field + self._flat(pose, field))
+                field = self._within(field + self._out(pose, field))
         return self._of_skin(best)
 
     def _within(self, field):
@@ -136,6 +139,14 @@ class Parting:
         now = pose.skin(field)
         flat = laid_flat(self.rest, now, self.faces, np.ones(len(now)), rounds=_FLAT_ROUNDS)
         return (flat - now) / np.maximum(pose.act, self.options.least_act)
+
+    def _out(self, pose, field):
+        """(k, 3) what takes vertices of a pose that the correction moves out of what they must not enter."""
+        moved = np.flatnonzero(field.any(axis=1)) if len(pose.pairs) else []
+        way = np.zeros_like(field)
+        if len(moved):
+            way[moved] = pose.way_out(pose.skin(field)[moved])
+        return way / np.maximum(pose.act, self.options.least_act)
 
     def _ways(self, now, pairs):
         """(k, 3) from the first face of each pair to the second, in the mean of what their corners look along."""
@@ -217,8 +228,8 @@ class Parting:
 class _Pose:
     """What is known of one pose: crossings now, and all pairs met with their senses."""
 
-    def __init__(self, vertices, act):
-        self._vertices, self.act = vertices, act
+    def __init__(self, vertices, act, way_out):
+        self._vertices, self.act, self.way_out = vertices, act, way_out
         self.looked, self.pairs, self.met = None, np.empty((0, 2), np.int64), np.empty((0, 2), np.int64)
         self.senses = np.empty(0)
 

@@ -75,6 +75,18 @@ class Teeth:
         return bool(np.median(self._winding(behind)) > 0.8)
 
 
+def rows_of_teeth(template, vertices):
+    """[(slice of vertices, Teeth)] of a head's rows of teeth; vertices (n, 3) at rest in the Template's topology."""
+    rows = [part for part in template.parts if part.name.startswith("teeth")]
+    faces = [template.faces[part.face_slice] - part.vertices[0] for part in rows]
+    return [(part.vertex_slice, Teeth(vertices[part.vertex_slice], row)) for part, row in zip(rows, faces)]
+
+
+def out_of_teeth(rows, head, points):
+    """(k, 3) ways out of the rows_of_teeth for points (k, 3), zero outside; head (n, 3) in its pose."""
+    return sum((row.way_out(points, head[place])[0] for place, row in rows), np.zeros_like(points))
+
+
 def _outer_side(vertices, faces):
     """(m,) bool: faces of an arch that look away from its middle; the arch lies flat along its two longer axes."""
     middle = vertices.mean(axis=0)

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from facewright.mesh.laplacian import clamped_laplacian, lumped_mass
 from facewright.solve.quadratic import Factorization
 
 # A symmetric 3 x 3 block is kept as xx, xy, xz, yy, yz, zz.
@@ -45,8 +46,8 @@ class ElasticSkin:
         self.vertices = vertices
         self.faces = faces
         n = len(vertices)
-        L = safe_laplacian(vertices, faces)
-        mass = np.maximum(vertex_mass(vertices, faces), 0.02)
+        L = clamped_laplacian(vertices, faces)
+        mass = np.maximum(lumped_mass(vertices, faces), 0.02)
         local = np.ones(n) if stiffness is None else stiffness
         self.L = L
         self.bending = (L.T @ sp.diags(local / mass) @ L).tocsr()
@@ -64,30 +65,6 @@ class ElasticSkin:
         preconditioner = Factorization(shared + diagonal + 1e-9 * sp.eye(n))
         x = np.zeros((n, 3)) if start is None else start.copy()
         return _conjugate_gradients(shared.tocsr(), A, b, preconditioner, x, tolerance, max_iterations)
-
-
-def safe_laplacian(vertices, faces):
-    """Cotangent Laplacian with every edge weight clamped to 0.05..5: slivers of real templates stay harmless."""
-    n = len(vertices)
-    rows, cols, values = [], [], []
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        a, b, c = vertices[faces[:, i]], vertices[faces[:, j]], vertices[faces[:, k]]
-        u, v = a - c, b - c
-        cotangent = (u * v).sum(1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-9)
-        rows.append(faces[:, i])
-        cols.append(faces[:, j])
-        values.append(0.5 * cotangent)
-    W = sp.coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(n, n)).tocsr()
-    W = W + W.T
-    W.data = np.clip(W.data, 0.05, 5.0)
-    return (sp.diags(np.asarray(W.sum(axis=1)).ravel()) - W).tocsr()
-
-
-def vertex_mass(vertices, faces):
-    """(n,) a third of the areas around each vertex."""
-    a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(faces.ravel(), weights=np.repeat(areas, 3), minlength=len(vertices))
 
 
 def _data_terms(rows, vertices):

@@ -14,6 +14,7 @@ from facewright.mesh.openness import vertex_openness
 from facewright.mesh.polygons import triangulated
 from facewright.template import rules
 from facewright.template.assemble import assemble, fit_sphere
+from facewright.template.corners import even_corners, relaxed_corners
 from facewright.template.landmarks import template_landmarks
 from facewright.template.lines import feature_lines, find_loops
 from facewright.template.lips import closed_lips, paired_modes
@@ -49,11 +50,13 @@ def build_template(source_folder, description_path):
     loops = find_loops(head, skin_openness(head))
     lines = feature_lines(head, loops, stops)
     vertices, identity = _closed_lips(description, shaped, vertices, identity, head, lines)
+    vertices = _relaxed_corners(description, shaped, vertices, head, lines)
     head = _head(shaped, vertices, mirror)
     openness = skin_openness(head)
     regions = skin_regions(head, openness, loops, lines)
 
     deltas = _shape_rules(description, shaped, vertices, names, deltas, head, lines)
+    identity, deltas = (_even_corners(description, shaped, head, lines, fields) for fields in (identity, deltas))
     deltas = rules.symmetric_shapes(names, deltas, mirror)
     identity = _even_eyes(shaped, vertices, identity, head)
     regions = _whole_head(regions, len(vertices))
@@ -195,6 +198,32 @@ def _closed_lips(description, shaped, vertices, identity, head, lines):
     for mode in modes:
         mode[skin] += keep(mode[skin])
     return closed, modes
+
+
+def _relaxed_corners(description, shaped, vertices, head, lines):
+    """The neutral without slivers at the corners of the mouth."""
+    options = description.get("rules", {}).get("even_corners")
+    if not options:
+        return vertices
+    seams, skin = (lines["lip_seam_upper"], lines["lip_seam_lower"]), shaped.parts[0].vertex_slice
+    relaxed = np.array(vertices)
+    moved = relaxed_corners(vertices[skin], head.faces, seams, radius_mm=float(options["relax_mm"]))
+    relaxed[skin] = symmetrized(moved, head.mirror)
+    return relaxed
+
+
+def _even_corners(description, shaped, head, lines, fields):
+    """Identity modes or shapes (s, n, 3) that move the small faces at the corners of the mouth alike."""
+    options = description.get("rules", {}).get("even_corners")
+    if not options:
+        return fields
+    corners, skin = lines["lip_seam_upper"][[0, -1]], shaped.parts[0].vertex_slice
+    radius, smooth = float(options["radius_mm"]), float(options["smooth_mm"])
+    even = np.array(fields)
+    even[:, skin] = even_corners(
+        head.vertices, head.faces, corners, fields[:, skin], radius_mm=radius, smooth_mm=smooth
+    )
+    return even
 
 
 def _shape_rules(description, shaped, vertices, names, deltas, head, lines):

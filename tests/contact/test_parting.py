@@ -46,15 +46,15 @@ def pressed(pads, by):
 
 def test_what_does_not_cross_stays(pads, parting):
     V, _, _ = pads
-    assert not parting([V], [1.0]).any()
-    assert not parting([pressed(pads, -0.1)], [1.0]).any()
+    assert not parting([V], [1.0], [np.zeros_like]).any()
+    assert not parting([pressed(pads, -0.1)], [1.0], [np.zeros_like]).any()
 
 
 def test_pads_in_each_other_come_apart_by_little(pads, parting):
     V, F, upper = pads
     pose = pressed(pads, 0.1)
     assert len(self_intersections(pose, F))
-    field = parting([pose], [1.0])
+    field = parting([pose], [1.0], [np.zeros_like])
     assert not len(self_intersections(pose + field, F))
     assert not len(folded_by_shape(V, pose + field, F))
     assert 0.02 < np.abs(field).max() < 0.15
@@ -66,7 +66,7 @@ def test_a_shape_and_its_half_are_parted_together(pads, parting):
     share = np.clip(0.5 + V[:, :1] / 8.0, 0.0, 1.0)
     motion = pressed(pads, 0.08) - V
     poses, acts = [V + motion, V + share * motion], [1.0, share]
-    field = parting(poses, acts)
+    field = parting(poses, acts, [np.zeros_like] * len(poses))
     left = [len(self_intersections(pose + act * field, F)) for pose, act in zip(poses, acts)]
     assert left == [0, 0]
 
@@ -75,5 +75,18 @@ def test_no_vertex_goes_farther_than_it_may(pads):
     V, F, upper = pads
     every = np.ones(len(F), bool)
     parting = Parting(V, F, every, every, np.where(upper, 0.5, 0.01))
-    field = parting([pressed(pads, 0.1)], [1.0])
+    field = parting([pressed(pads, 0.1)], [1.0], [np.zeros_like])
     assert np.linalg.norm(field[~upper], axis=1).max() < 0.01 + 1e-9
+
+
+def test_nothing_is_parted_into_what_is_solid(pads, parting):
+    _, F, upper = pads
+    pose = pressed(pads, 0.1)
+    top = pose[upper, 2].max() + 0.02
+
+    def down(points):
+        return np.minimum(top - points[:, 2], 0.0)[:, None] * [0.0, 0.0, 1.0]
+
+    field = parting([pose], [1.0], [down])
+    assert (pose + field)[:, 2].max() <= top + 1e-6
+    assert not len(self_intersections(pose + field, F))
