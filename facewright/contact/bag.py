@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
-from facewright.mesh.normals import vertex_normals
+from facewright.mesh.normals import dot, vertex_normals
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,12 @@ class MouthBag:
         self._wanted = np.clip(0.5 * depth[near], 0.0, self.options.flesh_mm)
         self._surface, every = np.unique(self.patch), np.arange(len(self.corners))
         rest = self._samples(vertices, every), vertices[self._surface]
-        self._at_rest = Watch(*rest).seen(*rest, every, np.maximum(depth[near] - self._wanted, 0.0))
+        self._at_rest = Watch(*rest, np.maximum(depth[near] - self._wanted, 0.0))
 
     def tucked(self, skin):
         """(n, 3) displacement that brings the lining of a pose (n, 3) back behind the outer skin."""
         moved, every = np.array(skin), np.arange(len(self.corners))
-        asked = self._at_rest.due(self._samples(skin, every), skin[self._surface])
+        asked = self._at_rest.at(self._samples(skin, every), skin[self._surface]).due()
         for _ in range(self.options.rounds):
             height, normal = self._heights(moved, asked)
             over = height + self._wanted[asked]
@@ -92,7 +92,7 @@ class MouthBag:
         points = self._samples(skin, index)
         found = Surface(skin, self.patch).closest(points)
         normal = interpolate(vertex_normals(skin, self._around), self.patch, found.faces, found.barycentric)
-        height = ((points - found.points) * normal).sum(axis=1)
+        height = dot(points - found.points, normal)
         # Past its rim no such skin lies before the lining.
         beyond = (self._rim[self.patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
         return np.where(beyond, -np.inf, height), normal

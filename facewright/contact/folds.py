@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from facewright.mesh.adjacency import touching
 from facewright.mesh.folds import laid_flat
 from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
 
@@ -34,7 +35,7 @@ def lay_flat(face, targets):
     def flat(name):
         delta = targets.delta(name)
         pose = delta[at] + sum(targets.delta(other)[at] for other in _beneath(name, targets))
-        near = faces[(np.abs(pose) > _MOVES_MM).any(axis=1)[faces].any(axis=1)]
+        near = faces[touching(np.abs(pose).max(axis=1) > _MOVES_MM, faces)]
         moved = V + pose
         result = laid_flat(V, moved, near, ease)
         if result is moved:

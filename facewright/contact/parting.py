@@ -16,9 +16,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from facewright.mesh.adjacency import touching
 from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
-from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.normals import lengths, normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
 
 _FOLD = 10.0  # crossings that a folded face counts as
@@ -87,7 +88,7 @@ class Parting:
         return self._of_skin(best)
 
     def _within(self, field):
-        length = np.linalg.norm(field, axis=1, keepdims=True)
+        length = lengths(field)[:, None]
         return field * np.minimum(1.0, self._farthest / np.maximum(length, 1e-12))
 
     def _of_skin(self, field):
@@ -108,7 +109,7 @@ class Parting:
             stirred = np.abs(now - self.rest).max(axis=1) > _STILL_MM
             pairs = self_intersections(now, self.faces, self._about(now, stirred)) if stirred.any() else pose.pairs
         else:
-            touched = (now != pose.looked).any(axis=1)[self.faces].any(axis=1)
+            touched = touching((now != pose.looked).any(axis=1), self.faces)
             kept = pose.pairs[~touched[pose.pairs].any(axis=1)]
             pairs = np.concatenate([kept, intersections_of(now, self.faces, touched)]) if touched.any() else kept
         pairs = pairs[self.asked[pairs].any(axis=1)]
@@ -123,11 +124,11 @@ class Parting:
     def _about(self, now, stirred):
         """(m,) bool: faces of vertices that are stirred or lie among those."""
         low, high = now[stirred].min(axis=0) - _ABOUT_MM, now[stirred].max(axis=0) + _ABOUT_MM
-        return (stirred | ((now > low) & (now < high)).all(axis=1))[self.faces].any(axis=1)
+        return touching(stirred | ((now > low) & (now < high)).all(axis=1), self.faces)
 
     def _folds(self, pose, field):
         """Number of folded faces of a pose among those that the correction moves."""
-        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, field.any(axis=1)[self.faces].any(axis=1)))
+        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, touching(field.any(axis=1), self.faces)))
 
     def _flat(self, pose, field):
         """(k, 3) what turns back faces of a pose that have been folded."""
@@ -193,7 +194,7 @@ class Parting:
         if not len(pose.pairs):
             return np.zeros_like(field)
         ways = self._ways(now, pose.met)
-        known = np.linalg.norm(ways, axis=1) > self.options.opposed
+        known = lengths(ways) > self.options.opposed
         a, b = self.faces[pose.met[known].T]
         ways = normalized(ways[known]) * pose.senses[known, None]
         for _ in range(self.options.sweeps):
