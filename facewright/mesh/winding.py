@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.mesh.normals import cross, lengths
+from facewright.mesh.normals import cross, dot, lengths
 
 _FAR = 4.0  # sizes of a face: from there on it counts as one dipole at its middle, which errs by under 0.001 of a turn
 _AT_ONCE = 1 << 17  # faces times points
@@ -25,26 +25,28 @@ def winding_numbers(vertices, faces, points):
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     area, middle = 0.5 * cross(b - a, c - a), (a + b + c) / 3.0
     size = np.max([lengths(corner - middle) for corner in (a, b, c)], axis=0)
+    # Columns whose product with a point's (x, y, z, 1) is half of what its squared distance lacks of |x|^2, and how far
+    # the point lies beneath the face, times its area.
+    about = np.stack([np.column_stack([-middle, 0.5 * dot(middle, middle)]), np.column_stack([-area, dot(area, middle)])])
     step = max(1, _AT_ONCE // max(len(faces), 1))
     pieces = [points[start : start + step] for start in range(0, len(points), step)]
-    return np.concatenate([_turns((a, b, c), area, middle, size, piece) for piece in pieces])
+    return np.concatenate([_turns((a, b, c), about, (_FAR * size) ** 2, piece) for piece in pieces])
 
 
-def _turns(corners, area, middle, size, points):
-    """As winding_numbers; area vectors (m, 3), middles (m, 3) and sizes (m,) of faces with corners three times (m, 3)."""
-    squared = (middle**2).sum(axis=1)[:, None] - 2.0 * (middle @ points.T) + (points**2).sum(axis=1)
-    near = squared < (_FAR * size[:, None]) ** 2
-    toward = (area * middle).sum(axis=1)[:, None] - area @ points.T
-    squared[near] = np.inf
-    solid = (toward / (squared * np.sqrt(squared))).sum(axis=0)
-    face, who = np.nonzero(near)
-    solid += np.bincount(who, _solid_angles(*(corner[face] - points[who] for corner in corners)), len(points))
-    return solid / (4.0 * np.pi)
+def _turns(corners, about, far, points):
+    """As winding_numbers; corners 3 x (m, 3), about (2, m, 4), far (m,) squared distance of what is a dipole."""
+    half, beneath = np.column_stack([points, np.ones(len(points))]) @ about.transpose(0, 2, 1)  # (k, m) each
+    squared = 2.0 * half + dot(points, points)[:, None]
+    near = np.flatnonzero(squared < far)
+    squared.ravel()[near] = np.inf
+    beneath /= squared * np.sqrt(squared)
+    who, face = np.divmod(near, len(far))
+    angles = _solid_angles(*(corner[face] - points[who] for corner in corners))
+    return (beneath.sum(axis=1) + np.bincount(who, angles, len(points))) / (4.0 * np.pi)
 
 
 def _solid_angles(a, b, c):
     """(k,) of triangles as seen from the origin, corners (k, 3) (van Oosterom and Strackee 1983)."""
     la, lb, lc = lengths(a), lengths(b), lengths(c)
-    over = (a * cross(b, c)).sum(axis=1)
-    under = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
-    return 2.0 * np.arctan2(over, under)
+    under = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
+    return 2.0 * np.arctan2(dot(a, cross(b, c)), under)
