@@ -21,6 +21,7 @@ from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
 from facewright.mesh.normals import lengths, normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
+from facewright.mesh.winding import winding_numbers
 
 _FOLD = 10.0  # crossings that a folded face counts as
 _FLAT_ROUNDS = 3
@@ -64,7 +65,7 @@ class Parting:
         self._before = self._keys(self_intersections(self.rest, self.faces))
         # What is left out here would close these faces: in front of the skin at rest there is no flesh.
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
-        self._beyond = -self._winding(self.rest, outside)
+        self._beyond = -np.asarray(igl.fast_winding_number(self.rest, self.faces, outside)).reshape(-1)
 
     def __call__(self, poses, acts):
         """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
@@ -147,7 +148,7 @@ class Parting:
         """(k,) winding number on either side of a crossing: 1 where two skins meet, 0 of a skin and its own lining."""
         one, other = (now[self.faces[pairs[:, i]]] for i in (0, 1))
         points = crossing_points(one, other) + self.options.aside_mm * normalized(self._ways(now, pairs))
-        return self._winding(now, points) + self._beyond[self.faces[pairs]].mean(axis=(1, 2))
+        return winding_numbers(now, self.faces, points) + self._beyond[self.faces[pairs]].mean(axis=(1, 2))
 
     def _senses(self, now, pose):
         """(k,) of all pairs met: 1 where two skins meet, -1 where a skin has come through its own lining.
@@ -182,11 +183,6 @@ class Parting:
             flesh = np.clip(self._flesh(now, pairs[unsure]), 0.0, 1.0)
             votes += np.bincount(label[unsure], flesh - 0.5, minlength=count)
         return votes
-
-    def _winding(self, skin, points):
-        tree = igl.FastWindingNumberBVH()
-        tree.init(np.ascontiguousarray(skin), self.faces)
-        return np.asarray(tree.winding_number(np.ascontiguousarray(points))).reshape(-1)
 
     def _apart(self, pose, field):
         """(k, 3) what moves apart the faces that have crossed so far in a pose."""
