@@ -150,6 +150,7 @@ class LipContact:
         most_weight = self._where_it_acts_most(weights, acts)
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
         asked, left, watches, last = list(poses), {}, {}, self._at_rest
+        solved = {}  # the field with which a pose was asked last
         best, least = field, np.inf  # rounds may swing where lips and teeth both push
         for width in (*(_LOCAL_MM if closed else self.options.smooth_mm), None):
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
@@ -158,7 +159,7 @@ class LipContact:
                 skin = poses[weight][self.used] + share * field
                 last = watches.get(weight, last)
                 wishes, heeded, last = self._wishes(skin, poses[weight], last)
-                watches[weight] = last
+                watches[weight], solved[weight] = last, field
                 left[weight] = max(lengths(wishes).max(initial=0.0), self.options.touch_mm)
                 if closed:
                     self._add_closing(skin, wishes, heeded)
@@ -174,10 +175,10 @@ class LipContact:
                 best, least = field, max(left.values())
             if met and width is not None:
                 field = self.spread(field + total, _PIN * hold, width)
-            elif len(asked) == len(poses):
-                break
             # What was free stays unasked until the rest is free: most of a path never touches.
-            asked = met or list(poses)
+            asked = met or [weight for weight in poses if solved[weight] is not field]
+            if not asked:
+                break
         return self._of_head(best)
 
     def lifted(self, motion, forward):
@@ -200,8 +201,7 @@ class LipContact:
     def _of_head(self, field):
         """(n, 3) a field of the surroundings of the lips (k, 3) as one of the whole head."""
         result = np.zeros_like(self.V)
-        result[self.used] = field
-        result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
+        result[self.used] = np.where(np.abs(field).max(axis=1, keepdims=True) < _NOTHING_MM, 0.0, field)
         return result
 
     def _wishes(self, skin, pose, watches):
