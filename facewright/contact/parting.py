@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from facewright.mesh.adjacency import touching
+from facewright.mesh.adjacency import differing, touching
 from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
 from facewright.mesh.normals import lengths, normalized, vertex_normals
@@ -110,7 +110,7 @@ class Parting:
             stirred = np.abs(now - self.rest).max(axis=1) > _STILL_MM
             pairs = self_intersections(now, self.faces, self._about(now, stirred)) if stirred.any() else pose.pairs
         else:
-            touched = touching((now != pose.looked).any(axis=1), self.faces)
+            touched = touching(differing(now, pose.looked), self.faces)
             kept = pose.pairs[~touched[pose.pairs].any(axis=1)]
             pairs = np.concatenate([kept, intersections_of(now, self.faces, touched)]) if touched.any() else kept
         pairs = pairs[self.asked[pairs].any(axis=1)]

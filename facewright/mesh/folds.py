@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.mesh.adjacency import dilate, touching, within
+from facewright.mesh.adjacency import differing, dilate, touching, within
 from facewright.mesh.normals import cross, dot, face_areas, face_cross, face_normals, lengths
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
@@ -20,7 +20,7 @@ def folded_by_shape(neutral, moved, faces, mask=None):
     neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
     fitted to the corners of all faces that share a vertex with it (Kabsch). Only faces that turn at all are asked.
     """
-    stirred = touching(_differ(moved, neutral), faces)
+    stirred = touching(differing(moved, neutral), faces)
     asked = np.flatnonzero(stirred if mask is None else stirred & mask)
     turned = dot(face_normals(neutral, faces[asked]), face_normals(moved, faces[asked])) < _HARDLY_TURNED
     asked = asked[turned]
@@ -28,12 +28,6 @@ def folded_by_shape(neutral, moved, faces, mask=None):
         return asked
     expected = _expected_normals(neutral, moved, faces, asked)
     return asked[dot(expected, face_normals(moved, faces[asked])) < 0]
-
-
-def _differ(one, other):
-    """(n,) bool: rows of (n, 3) that are not the same."""
-    differ = one != other
-    return differ[:, 0] | differ[:, 1] | differ[:, 2]
 
 
 def _expected_normals(neutral, moved, faces, asked):
