@@ -323,16 +323,16 @@ class _Mouth:
 
 
 def _added(targets, fields):
-    """Targets with shares of fields added to shapes and to what they pass: fields pairs of (n, 3) and name -> factor."""
-    fields = [(field, shares) for field, shares in fields if field.any()]
+    """Targets with shares of fields added to shapes and to what they pass: pairs of (n, 3) and dict name -> factor."""
+    fields = [(change, shares) for change, shares in fields if change.any()]
     if not fields:
         return targets
     deltas, extras = np.array(targets.deltas), dict(targets.extras)
-    for field, shares in fields:
+    for change, shares in fields:
         for name, share in shares.items():
-            deltas[targets.names.index(name)] += share * field
+            deltas[targets.names.index(name)] += share * change
             for weight, target in targets.in_betweens.get(name, {}).items():
-                extras[target] = extras[target] + weight * share * field
+                extras[target] = extras[target] + weight * share * change
     return replace(targets, deltas=deltas, extras=extras)
 
 

@@ -24,13 +24,15 @@ def dot(a, b):
 
 
 def lengths(vectors):
-    """(...) lengths of vectors (..., 3); numpy's own sums take several times as long over rows of three."""
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    return np.sqrt(x * x + y * y + z * z)
+    """(...) lengths of vectors (..., d); numpy's own sums take several times as long over short rows."""
+    squared = vectors[..., 0] * vectors[..., 0]
+    for i in range(1, vectors.shape[-1]):
+        squared = squared + vectors[..., i] * vectors[..., i]
+    return np.sqrt(squared)
 
 
 def normalized(vectors):
-    """Vectors (..., 3) scaled to unit length; a zero one stays zero."""
+    """Vectors (..., d) scaled to unit length; a zero one stays zero."""
     length = lengths(vectors)[..., None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 

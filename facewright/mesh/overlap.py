@@ -37,7 +37,7 @@ def _corners_over(p, q):
 
 
 def _edges_over(p, q):
-    """Places where edges of triangles p, q (k, 3, 2) pass each other: barycentric (k, 9, 3) and (k, 9) bool as above."""
+    """The same where edges of the two pass each other: (k, 9, 3) twice and (k, 9)."""
     i, j = np.divmod(np.arange(9), 3)
     t, s = _where_edges_pass(p[:, i], p[:, i - 2], q[:, j], q[:, j - 2])
     at, there = np.zeros((len(p), 9, 3)), np.zeros((len(p), 9, 3))
@@ -96,7 +96,7 @@ def _barycentric(triangle, points):
 
 
 def _where_edges_pass(a, b, c, d):
-    """Shares (...), (...) of the edges a-b and c-d (..., 2) at which they pass each other; -1 where they are parallel."""
+    """Shares (...), (...) of edges a-b and c-d (..., 2) at which they pass each other; -1 where they are parallel."""
     r, s, to = b - a, d - c, c - a
     turn = _cross(r, s)
     parallel = np.abs(turn) < _NOTHING

@@ -73,7 +73,8 @@ class Puppet:
             touched = differing(now, rest)
             if shade is not None:
                 touched |= shade != lit
-            touched = dilate(touched, mesh.faces, 2)  # a vertex turns its neighbours' normals, which light the faces around
+            # A vertex turns the normals of its neighbours, which light the faces around them.
+            touched = dilate(touched, mesh.faces, 2)
             corners += [rest[touched], now[touched]]
         corners = np.concatenate(corners) if corners else np.zeros((0, 3))
         if not len(corners):
