@@ -150,7 +150,7 @@ class Landmarks:
         return np.einsum("kc,kcd->kd", self.barycentric, vertices[faces[self.faces]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Template:
     """A head as data. Vertices, faces, uv and mirror are frozen once released (topology_id).
 

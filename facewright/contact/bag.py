@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
-from facewright.mesh.normals import vertex_normals
+from facewright.mesh.normals import dot, vertex_normals
 
 
 @dataclass(frozen=True)
@@ -54,19 +54,21 @@ class MouthBag:
         mine = faces[inner[faces].all(axis=1) & (self.free[faces] > 0.0).any(axis=1)]
         self.corners = np.repeat(mine, len(_SAMPLES), axis=0)
         self.shares = np.tile(_SAMPLES, (len(mine), 1))
+        self._place = _same_place(self.corners, self.shares)
         self._rim = border_vertices(self.patch, len(vertices))
         depth = np.nan_to_num(-self._heights(vertices, np.arange(len(mine) * len(_SAMPLES)))[0], posinf=0.0)
         near = (depth > self.options.least_mm) & (depth < self.options.most_mm)
         self.corners, self.shares = self.corners[near], self.shares[near]
+        self._place = _same_place(self.corners, self.shares)
         self._wanted = np.clip(0.5 * depth[near], 0.0, self.options.flesh_mm)
         self._surface, every = np.unique(self.patch), np.arange(len(self.corners))
         rest = self._samples(vertices, every), vertices[self._surface]
-        self._at_rest = Watch(*rest).seen(*rest, every, np.maximum(depth[near] - self._wanted, 0.0))
+        self._at_rest = Watch(*rest, np.maximum(depth[near] - self._wanted, 0.0))
 
     def tucked(self, skin):
         """(n, 3) displacement that brings the lining of a pose (n, 3) back behind the outer skin."""
         moved, every = np.array(skin), np.arange(len(self.corners))
-        asked = self._at_rest.due(self._samples(skin, every), skin[self._surface])
+        asked = self._at_rest.at(self._samples(skin, every), skin[self._surface]).due()
         for _ in range(self.options.rounds):
             height, normal = self._heights(moved, asked)
             over = height + self._wanted[asked]
@@ -89,10 +91,19 @@ class MouthBag:
 
     def _heights(self, skin, index):
         """(k,) how far samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
-        points = self._samples(skin, index)
+        _, first, again = np.unique(self._place[index], return_index=True, return_inverse=True)
+        points = self._samples(skin, index[first])
         found = Surface(skin, self.patch).closest(points)
         normal = interpolate(vertex_normals(skin, self._around), self.patch, found.faces, found.barycentric)
-        height = ((points - found.points) * normal).sum(axis=1)
+        height = dot(points - found.points, normal)
         # Past its rim no such skin lies before the lining.
         beyond = (self._rim[self.patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
-        return np.where(beyond, -np.inf, height), normal
+        return np.where(beyond, -np.inf, height)[again], normal[again]
+
+
+def _same_place(corners, shares):
+    """(k,) numbers of points with shares (k, 3) of vertices (k, 3): those on edges and corners lie in several faces."""
+    order = np.where(shares > 0.0, corners, -1).argsort(axis=1)
+    who = np.take_along_axis(np.where(shares > 0.0, corners, -1), order, axis=1)
+    thirds = np.take_along_axis(np.rint(3.0 * shares).astype(np.int64), order, axis=1)
+    return np.unique(np.concatenate([who, thirds], axis=1), axis=0, return_inverse=True)[1].reshape(-1)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
+from facewright.mesh.adjacency import touching
 from facewright.mesh.folds import laid_flat
 from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
 
@@ -39,19 +40,21 @@ def lay_flat(face, targets):
     def flat(name):
         delta = targets.delta(name)
         pose = delta + sum(targets.delta(other) for other in _beneath(name, targets))
-        near = faces[(np.abs(pose[at]) > _MOVES_MM).any(axis=1)[faces].any(axis=1)]
+        near = faces[touching(np.abs(pose[at]).max(axis=1) > _MOVES_MM, faces)]
         moved = V + pose[at]
         result = moved
         for _ in range(_ROUNDS):
             before, result = result, laid_flat(V, result, near, ease)
             changed = np.flatnonzero((result != moved).any(axis=1))
-            if result is before or not len(changed):
+            if result is before:
                 break
             way = out_of_teeth(teeth, face.vertices + pose, result[changed])
             if not way.any():
                 break
             result = np.array(result)
             result[changed] += way
+        if result is moved:
+            return delta
         delta = delta.copy()
         delta[at] += result - moved
         return delta

@@ -21,9 +21,10 @@ from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.laplacian import lumped_mass
-from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.normals import lengths, normalized, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.spread import SoftSpread
+from facewright.mesh.winding import winding_numbers
 
 _ASIDE_MM = 0.02  # a vertex is asked about this far in front of its own surface, so that this does not count
 _MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
@@ -94,6 +95,7 @@ class LipContact:
         lines = [place[line] for line in seams]
         self._pairs, self._ends = [line[1:-1] for line in lines], lines[0][[0, -1]]
         self._both = np.concatenate(self.sides)
+        self._about_lips = self.faces[np.isin(self.faces, self._both).any(axis=1)]  # what their normals depend on
         self.lips = self.used[self._both]
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
@@ -148,6 +150,7 @@ class LipContact:
         most_weight = self._where_it_acts_most(weights, acts)
         poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
         asked, left, watches, last = list(poses), {}, {}, self._at_rest
+        solved = {}  # the field with which a pose was asked last
         best, least = field, np.inf  # rounds may swing where lips and teeth both push
         for width in (*(_LOCAL_MM if closed else self.options.smooth_mm), None):
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
@@ -156,13 +159,13 @@ class LipContact:
                 skin = poses[weight][self.used] + share * field
                 last = watches.get(weight, last)
                 wishes, heeded, last = self._wishes(skin, poses[weight], last)
-                watches[weight] = last
-                left[weight] = max(np.linalg.norm(wishes, axis=1).max(initial=0.0), self.options.touch_mm)
+                watches[weight], solved[weight] = last, field
+                left[weight] = max(lengths(wishes).max(initial=0.0), self.options.touch_mm)
                 if closed:
                     self._add_closing(skin, wishes, heeded)
                 if shut and weight == most_weight:
                     self._add_shutting(skin, wishes, heeded)
-                size = np.linalg.norm(wishes, axis=1) / share
+                size = lengths(wishes) / share
                 more = size > most
                 total[more], most[more] = wishes[more] / share, size[more]
                 hold = np.maximum(hold, heeded)
@@ -172,10 +175,10 @@ class LipContact:
                 best, least = field, max(left.values())
             if met and width is not None:
                 field = self.spread(field + total, _PIN * hold, width)
-            elif len(asked) == len(poses):
-                break
             # What was free stays unasked until the rest is free: most of a path never touches.
-            asked = met or list(poses)
+            asked = met or [weight for weight in poses if solved[weight] is not field]
+            if not asked:
+                break
         return self._of_head(best)
 
     def lifted(self, motion, forward):
@@ -198,8 +201,7 @@ class LipContact:
     def _of_head(self, field):
         """(n, 3) a field of the surroundings of the lips (k, 3) as one of the whole head."""
         result = np.zeros_like(self.V)
-        result[self.used] = field
-        result[np.abs(result).max(axis=1) < _NOTHING_MM] = 0.0
+        result[self.used] = np.where(np.abs(field).max(axis=1, keepdims=True) < _NOTHING_MM, 0.0, field)
         return result
 
     def _wishes(self, skin, pose, watches):
@@ -209,10 +211,11 @@ class LipContact:
         wishes, counts, lips = self._lip_wishes(skin, watches.lips)
         guarded, teeth = skin[self._guarded], []
         for (at, row), allowed, watch in zip(self.teeth, self._in_teeth, watches.teeth):
-            due = watch.due(guarded, pose[at])
+            watch = watch.at(guarded, pose[at])
+            due = watch.due()
             way, clearance = row.way_out(guarded[due], pose[at])
-            teeth.append(watch.seen(guarded, pose[at], due, clearance))
-            depth, allowed = np.linalg.norm(way, axis=1), allowed[due]
+            teeth.append(watch.answered(due, clearance))
+            depth, allowed = lengths(way), allowed[due]
             hit = depth > allowed + self.options.touch_mm
             farther = (depth - allowed)[hit] + self.options.off_mm
             wishes[self._guarded[due[hit]]] = way[hit] * (farther / depth[hit])[:, None]
@@ -237,9 +240,8 @@ class LipContact:
 
     def _lip_wishes(self, skin, watches):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
-        normals = vertex_normals(skin, self.faces)
-        flesh = _Flesh(skin, self.faces, skin + _ASIDE_MM * normals, self._beyond)
-        *both, watches = zip(*(self._entered(skin, normals, flesh, side, watch) for side, watch in enumerate(watches)))
+        normals = vertex_normals(skin, self._about_lips)
+        *both, watches = zip(*(self._entered(skin, normals, side, watch) for side, watch in enumerate(watches)))
         index, corners, share, way = map(np.concatenate, both)
         wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
         at = np.concatenate([index[:, None], corners], axis=1).ravel()
@@ -250,15 +252,21 @@ class LipContact:
         np.add.at(counts, at, weight)
         return wishes / np.maximum(counts, 1.0)[:, None], counts, watches
 
-    def _entered(self, skin, normals, flesh, side, watch):
+    def _in_flesh(self, skin, normals, index):
+        """(k,) bool of vertices (k,) of the lips: flesh lies in front of them."""
+        asked = skin[index] + _ASIDE_MM * normals[index]
+        return winding_numbers(skin, self.faces, asked) + self._beyond[index] > 0.5
+
+    def _entered(self, skin, normals, side, watch):
         """Vertices (k,) of a lip that lie in the other one, with the corners (k, 3) of the triangle they have passed,
         their shares of it (k, 3) and the way out (k, 3); and the Watch for the next pose."""
         mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
         points, other = skin[mine], skin[self.sides[1 - side]]
-        due = watch.due(points, other)
+        watch = watch.at(points, other)
+        due = watch.due()
         if not len(due):
             none = np.zeros((0, 3))
-            return due, none.astype(int), none, none, watch.seen(points, other, due, 0.0)
+            return due, none.astype(int), none, none, watch
         found = Surface(skin, patch).closest(points[due])
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
@@ -267,28 +275,10 @@ class LipContact:
         maybe = behind & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
         inside = np.flatnonzero(maybe)
-        inside = inside[flesh.holds(mine[due[inside]])]
-        watch = watch.seen(points, other, due, np.where(behind, 0.0, depth))
-        out = way + self.options.gap_mm * normal
-        return mine[due[inside]], corners[inside], found.barycentric[inside], out[inside], watch
-
-
-class _Flesh:
-    """Where flesh is: points (n, 3) asked for the vertices of a patch, and what the rest of the head adds (n,)."""
-
-    def __init__(self, vertices, faces, asked, beyond):
-        self._patch, self._asked, self._beyond = (vertices, faces), asked, beyond
-        self._tree = None
-
-    def holds(self, index):
-        """(k,) bool for vertices (k,); the tree is built for the first that asks."""
-        if not len(index):
-            return np.zeros(0, bool)
-        if self._tree is None:
-            self._tree = igl.FastWindingNumberBVH()
-            self._tree.init(*self._patch)
-        number = np.asarray(self._tree.winding_number(np.ascontiguousarray(self._asked[index]))).reshape(-1)
-        return number + self._beyond[index] > 0.5
+        inside = inside[self._in_flesh(skin, normals, mine[due[inside]])]
+        watch = watch.answered(due, np.where(behind, 0.0, depth))
+        out = way[inside] + self.options.gap_mm * normal[inside]
+        return mine[due[inside]], corners[inside], found.barycentric[inside], out, watch
 
 
 def _winding(vertices, faces, points):

@@ -136,9 +136,7 @@ class _Mouth:
         if changed_from is not None:
             names = [name for name in names if (targets.delta(name) != changed_from.delta(name)).any()]
         lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
-        for name, lack in zip(names, lacks):
-            targets = _added(targets, lack, {name: 1.0})
-        return targets
+        return _added(targets, [(lack, {name: 1.0}) for name, lack in zip(names, lacks)])
 
     def with_both_sides(self, targets):
         """Targets of which left and right together keep the lips apart too; each side gets its share."""
@@ -321,18 +319,20 @@ class _Mouth:
 
     def _corrected(self, targets, pose, shares, **how):
         """Targets after the contact of a pose has been solved along its way; shares: name -> its part of the result."""
-        return _added(targets, self._lack(targets, pose, **how), shares)
+        return _added(targets, [(self._lack(targets, pose, **how), shares)])
 
 
-def _added(targets, field, shares):
-    """Targets with shares of a field (n, 3) added to shapes and to what they pass: shares name -> factor."""
-    if not field.any():
+def _added(targets, fields):
+    """Targets with shares of fields added to shapes and to what they pass: pairs of (n, 3) and dict name -> factor."""
+    fields = [(change, shares) for change, shares in fields if change.any()]
+    if not fields:
         return targets
     deltas, extras = np.array(targets.deltas), dict(targets.extras)
-    for name, share in shares.items():
-        deltas[targets.names.index(name)] += share * field
-        for weight, target in targets.in_betweens.get(name, {}).items():
-            extras[target] = extras[target] + weight * share * field
+    for change, shares in fields:
+        for name, share in shares.items():
+            deltas[targets.names.index(name)] += share * change
+            for weight, target in targets.in_betweens.get(name, {}).items():
+                extras[target] = extras[target] + weight * share * change
     return replace(targets, deltas=deltas, extras=extras)
 
 

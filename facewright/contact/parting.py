@@ -16,10 +16,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from facewright.mesh.adjacency import differing, touching
 from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
-from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.normals import lengths, normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
+from facewright.mesh.winding import winding_numbers
 
 _FOLD = 10.0  # crossings that a folded face counts as
 _FLAT_ROUNDS = 3
@@ -63,7 +65,7 @@ class Parting:
         self._before = self._keys(self_intersections(self.rest, self.faces))
         # What is left out here would close these faces: in front of the skin at rest there is no flesh.
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
-        self._beyond = -self._winding(self.rest, outside)
+        self._beyond = -np.asarray(igl.fast_winding_number(self.rest, self.faces, outside)).reshape(-1)
 
     def __call__(self, poses, acts, ways_out):
         """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
@@ -90,7 +92,7 @@ class Parting:
         return self._of_skin(best)
 
     def _within(self, field):
-        length = np.linalg.norm(field, axis=1, keepdims=True)
+        length = lengths(field)[:, None]
         return field * np.minimum(1.0, self._farthest / np.maximum(length, 1e-12))
 
     def _of_skin(self, field):
@@ -111,7 +113,7 @@ class Parting:
             stirred = np.abs(now - self.rest).max(axis=1) > _STILL_MM
             pairs = self_intersections(now, self.faces, self._about(now, stirred)) if stirred.any() else pose.pairs
         else:
-            touched = (now != pose.looked).any(axis=1)[self.faces].any(axis=1)
+            touched = touching(differing(now, pose.looked), self.faces)
             kept = pose.pairs[~touched[pose.pairs].any(axis=1)]
             pairs = np.concatenate([kept, intersections_of(now, self.faces, touched)]) if touched.any() else kept
         pairs = pairs[self.asked[pairs].any(axis=1)]
@@ -126,11 +128,11 @@ class Parting:
     def _about(self, now, stirred):
         """(m,) bool: faces of vertices that are stirred or lie among those."""
         low, high = now[stirred].min(axis=0) - _ABOUT_MM, now[stirred].max(axis=0) + _ABOUT_MM
-        return (stirred | ((now > low) & (now < high)).all(axis=1))[self.faces].any(axis=1)
+        return touching(stirred | ((now > low) & (now < high)).all(axis=1), self.faces)
 
     def _folds(self, pose, field):
         """Number of folded faces of a pose among those that the correction moves."""
-        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, field.any(axis=1)[self.faces].any(axis=1)))
+        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, touching(field.any(axis=1), self.faces)))
 
     def _flat(self, pose, field):
         """(k, 3) what turns back faces of a pose that have been folded."""
@@ -157,7 +159,7 @@ class Parting:
         """(k,) winding number on either side of a crossing: 1 where two skins meet, 0 of a skin and its own lining."""
         one, other = (now[self.faces[pairs[:, i]]] for i in (0, 1))
         points = crossing_points(one, other) + self.options.aside_mm * normalized(self._ways(now, pairs))
-        return self._winding(now, points) + self._beyond[self.faces[pairs]].mean(axis=(1, 2))
+        return winding_numbers(now, self.faces, points) + self._beyond[self.faces[pairs]].mean(axis=(1, 2))
 
     def _senses(self, now, pose):
         """(k,) of all pairs met: 1 where two skins meet, -1 where a skin has come through its own lining.
@@ -193,18 +195,13 @@ class Parting:
             votes += np.bincount(label[unsure], flesh - 0.5, minlength=count)
         return votes
 
-    def _winding(self, skin, points):
-        tree = igl.FastWindingNumberBVH()
-        tree.init(np.ascontiguousarray(skin), self.faces)
-        return np.asarray(tree.winding_number(np.ascontiguousarray(points))).reshape(-1)
-
     def _apart(self, pose, field):
         """(k, 3) what moves apart the faces that have crossed so far in a pose."""
         start = now = pose.skin(field)
         if not len(pose.pairs):
             return np.zeros_like(field)
         ways = self._ways(now, pose.met)
-        known = np.linalg.norm(ways, axis=1) > self.options.opposed
+        known = lengths(ways) > self.options.opposed
         a, b = self.faces[pose.met[known].T]
         ways = normalized(ways[known]) * pose.senses[known, None]
         for _ in range(self.options.sweeps):

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 
 from facewright.mesh.closest import Surface
-from facewright.mesh.normals import face_normals, vertex_normals
+from facewright.mesh.normals import dot, face_normals, lengths, vertex_normals
 
 _BEHIND_MM = 0.2
 _MOST_MM = 8.0  # skin this deep in a tooth has come from elsewhere
@@ -44,24 +44,23 @@ class Teeth:
         affine = self._to_affine @ moved
         A, t = affine[:3].T, affine[3]
         back = np.linalg.solve(A, (points - t).T).T
-        clearance = np.linalg.norm(np.maximum(np.maximum(self._low - back, back - self._high), 0.0), axis=1)
+        clearance = lengths(np.maximum(np.maximum(self._low - back, back - self._high), 0.0))
         near = np.flatnonzero(clearance == 0.0)
         if len(near):
-            # Most points lie before the outer side: only the rest need the dear question.
+            # Most points lie before the nearest face: only the rest need the dear question.
+            clearance[near] = self._before_all(back[near])
+            near = near[clearance[near] == 0.0]
+            near = near[self._winding(back[near]) > 0.5]
             found = self._outside.closest(back[near])
             way = found.points - back[near]
-            behind = (way * self._normals[found.faces]).sum(axis=1) > 0
-            inside = np.flatnonzero(behind & (found.distance < _MOST_MM))
-            inside = inside[self._winding(back[near[inside]]) > 0.5]
-            result[near[inside]] = way[inside] @ A.T
-            clearance[near] = self._clear_of_all(back[near])
-            clearance[near[inside]] = 0.0
+            out = (dot(way, self._normals[found.faces]) > 0) & (found.distance < _MOST_MM)
+            result[near[out]] = way[out] @ A.T
         return result, clearance * np.linalg.svd(A, compute_uv=False)[-1]
 
-    def _clear_of_all(self, points):
+    def _before_all(self, points):
         """(k,) distance of points (k, 3) to the row, 0 for those behind its nearest face."""
         found = self._surface.closest(points)
-        before = ((found.points - points) * self._surface_normals[found.faces]).sum(axis=1) <= 0
+        before = dot(found.points - points, self._surface_normals[found.faces]) <= 0
         return np.where(before, found.distance, 0.0)
 
     def _winding(self, points):

@@ -4,33 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.mesh.normals import lengths
+
 
 class Watch:
     """Points of a pose, each with a clearance: how far it was from a surface that it had not passed.
 
     A point that has moved less against the surface than its clearance is still on the same side of it. What is known of
     one pose thus serves the next one, of the same shape or another.
-    points (k, 3), surface (m, 3) mm; at first no point has any clearance
+    points (k, 3), surface (m, 3) mm, clearance (k,) mm; default: none, so that all must be asked
     """
 
-    def __init__(self, points, surface):
+    def __init__(self, points, surface, clearance=None):
         self._points, self._surface = points, surface
-        self._clearance = np.zeros(len(points))
+        self._clearance = np.zeros(len(points)) if clearance is None else clearance
 
-    def due(self, points, surface):
-        """(d,) indices of the points (k, 3) that must be asked about a surface (m, 3), in order."""
-        return np.flatnonzero(self._left(points, surface) <= 0.0)
+    def at(self, points, surface):
+        """The Watch for another pose, points (k, 3) and surface (m, 3), in which clearances are what is left of them.
 
-    def seen(self, points, surface, index, clearance):
-        """The Watch for the next pose, after points of an index (d,) were found to have a clearance (d,) mm."""
-        later = Watch(points, surface)
-        later._clearance = self._left(points, surface)
-        later._clearance[index] = clearance
-        return later
-
-    def _left(self, points, surface):
-        """(k,) clearance that is left; surface and points moving together cost none."""
+        Surface and points moving together cost none.
+        """
         shift = surface - self._surface
         common = shift.mean(axis=0)
-        sway = np.linalg.norm(shift - common, axis=1).max(initial=0.0)
-        return self._clearance - np.linalg.norm(points - self._points - common, axis=1) - sway
+        sway = lengths(shift - common).max(initial=0.0)
+        return Watch(points, surface, self._clearance - lengths(points - self._points - common) - sway)
+
+    def due(self):
+        """(d,) indices of the points that must be asked, in order."""
+        return np.flatnonzero(self._clearance <= 0.0)
+
+    def answered(self, index, clearance):
+        """The Watch after points of an index (d,) were found to have a clearance (d,) mm."""
+        known = np.array(self._clearance)
+        known[index] = clearance
+        return Watch(self._points, self._surface, known)

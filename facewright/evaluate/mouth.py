@@ -10,10 +10,11 @@ from facewright.conventions import MOUTH_PAIRS
 from facewright.evaluate.quality import lip_gaps_mm
 from facewright.evaluate.rows import Row
 from facewright.expand import expand_weights
-from facewright.mesh.adjacency import border_vertices
+from facewright.mesh.adjacency import border_vertices, touching
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.seam import seam_sides
+from facewright.mesh.winding import winding_numbers
 
 WEIGHTS = (0.25, 0.5, 0.75, 1.0)
 CROSSING_BAR_MM, TEETH_BAR_MM, CLOSE_BAR_MM = 0.3, 0.3, 0.5
@@ -145,6 +146,9 @@ class _Mouth:
         self.lips = np.flatnonzero(self.sides[0] | self.sides[1])
         near = cKDTree(V[np.concatenate(seams)]).query(V)[0] < FACE_MM
         self.around = F[near[F].all(axis=1)]
+        # What the normals of the lips, and of all that is around them, depend on.
+        self._about_lips = F[touching(self.sides[0] | self.sides[1], F)]
+        self._about = F[touching(near, F)]
         self.closed = _coned(self.around, len(V))
         self.apex = V[np.concatenate(seams)].mean(axis=0) - [0.0, 0.0, APEX_MM]
         self.teeth = [mesh for mesh in rig.meshes if mesh.name.startswith("teeth")]
@@ -171,7 +175,7 @@ class _Mouth:
 
     def crossing(self, skin):
         """Depth in mm of the deepest lip vertex of a pose (n, 3) inside the other lip."""
-        normals = vertex_normals(skin, self.skin.faces)
+        normals = vertex_normals(skin, self._about_lips)
         deepest = 0.0
         for side, patch, rim in zip(self.sides, self.patches[::-1], self.rims[::-1]):
             index = np.flatnonzero(side)
@@ -181,7 +185,8 @@ class _Mouth:
             maybe = behind & (found.distance > 0.5 * CROSSING_BAR_MM) & (found.distance < MOST_MM)
             maybe &= ~(rim[patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
             asked = index[maybe]
-            inside = _inside(self.with_apex(skin), self.closed, skin[asked] + _OFF_MM * normals[asked])
+            turns = winding_numbers(self.with_apex(skin), self.closed, skin[asked] + _OFF_MM * normals[asked])
+            inside = turns > 0.5
             deepest = max(deepest, found.distance[maybe][inside].max(initial=0.0))
         return float(deepest)
 
@@ -204,7 +209,7 @@ class _Mouth:
     def through(self, skin, teeth):
         """How far in mm teeth stand out of the skin of a pose, beyond the red of the lips."""
         farthest = 0.0
-        surface, normals = Surface(skin, self.around), vertex_normals(skin, self.skin.faces)
+        surface, normals = Surface(skin, self.around), vertex_normals(skin, self._about)
         for vertices, _ in teeth:
             found = surface.closest(vertices)
             normal = interpolate(normals, self.around, found.faces, found.barycentric)

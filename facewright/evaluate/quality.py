@@ -9,7 +9,7 @@ from facewright.evaluate.distances import on_border, sample_surface
 from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.intersect import self_intersections
-from facewright.mesh.normals import face_cross, face_normals, vertex_normals
+from facewright.mesh.normals import face_cross, face_normals, lengths, vertex_normals
 from facewright.mesh.raster import Camera, RayScene
 
 SURFACE_NEARBY_MM = 3.0
@@ -60,9 +60,8 @@ def torn_edges(neutral, moved, faces, mask=None, *, edges=None, grow_mm=4.0, fac
     """
     edges = unique_edges(faces) if edges is None else edges
     if mask is not None:
-        edges = edges[mask[edges].all(axis=1)]
-    rest = np.linalg.norm(neutral[edges[:, 0]] - neutral[edges[:, 1]], axis=1)
-    now = np.linalg.norm(moved[edges[:, 0]] - moved[edges[:, 1]], axis=1)
+        edges = edges[mask[edges[:, 0]] & mask[edges[:, 1]]]
+    rest, now = (lengths(points[edges[:, 0]] - points[edges[:, 1]]) for points in (neutral, moved))
     return edges[(now - rest > grow_mm) & (now > factor * rest)]
 
 

@@ -9,7 +9,7 @@ from facewright.evaluate.eyes import margin_gap_mm
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.quality import torn_edges
 from facewright.evaluate.rows import Row
-from facewright.mesh.adjacency import unique_edges
+from facewright.mesh.adjacency import touching, unique_edges
 from facewright.mesh.folds import folded_by_shape
 from facewright.mesh.intersect import self_intersections
 from facewright.working_set import read_working_set, region_depth
@@ -56,7 +56,7 @@ class SkinCheck:
             return 0
         low, high = moved[going].min(axis=0) - 1.0, moved[going].max(axis=0) + 1.0
         near = going | ((rest > low) & (rest < high)).all(axis=1)
-        now = self_intersections(moved, faces, near[faces].any(axis=1))
+        now = self_intersections(moved, faces, touching(near, faces))
         now = now[self._face[now].any(axis=1)]
         if self._before is None:
             self._before = _pair_keys(self_intersections(rest, faces), faces)

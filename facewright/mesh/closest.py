@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
+from facewright.mesh.normals import dot
+
 
 @dataclass(frozen=True)
 class ClosestPoints:
@@ -41,15 +43,14 @@ def barycentric_coordinates(points, triangles):
     """(k, 3) coordinates of points (k, 3) in triangles (k, 3, 3); degenerate triangles give their first corner."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     v0, v1, v2 = b - a, c - a, points - a
-    d00, d01, d11 = (v0 * v0).sum(1), (v0 * v1).sum(1), (v1 * v1).sum(1)
-    d20, d21 = (v2 * v0).sum(1), (v2 * v1).sum(1)
+    d00, d01, d11, d20, d21 = dot(v0, v0), dot(v0, v1), dot(v1, v1), dot(v2, v0), dot(v2, v1)
     denominator = d00 * d11 - d01 * d01
     good = denominator > 1e-30
     safe = np.where(good, denominator, 1.0)
     v = np.where(good, (d11 * d20 - d01 * d21) / safe, 0.0)
     w = np.where(good, (d00 * d21 - d01 * d20) / safe, 0.0)
-    coordinates = np.clip(np.stack([1 - v - w, v, w], axis=1), 0.0, 1.0)
-    return coordinates / coordinates.sum(axis=1, keepdims=True)
+    u, v, w = (np.clip(share, 0.0, 1.0) for share in (1 - v - w, v, w))
+    return np.stack([u, v, w], axis=1) / (u + v + w)[:, None]
 
 
 def interpolate(values, F, faces, barycentric):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.mesh.adjacency import dilate
-from facewright.mesh.normals import cross, face_areas, face_cross, face_normals
+from facewright.mesh.adjacency import differing, dilate, touching, within
+from facewright.mesh.normals import cross, dot, face_areas, face_cross, face_normals, lengths
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
 _LEAST_SHARE = 0.1  # of its area at rest that a face keeps, seen along the normal that it should have
@@ -20,21 +20,21 @@ def folded_by_shape(neutral, moved, faces, mask=None):
     neutral, moved (n, 3); faces (m, 3); mask (m,) bool limits the faces asked about. The rotation around a face is
     fitted to the corners of all faces that share a vertex with it (Kabsch). Only faces that turn at all are asked.
     """
-    stirred = (moved != neutral).any(axis=1)[faces].any(axis=1)
+    stirred = touching(differing(moved, neutral), faces)
     asked = np.flatnonzero(stirred if mask is None else stirred & mask)
-    turned = (face_normals(neutral, faces[asked]) * face_normals(moved, faces[asked])).sum(axis=1) < _HARDLY_TURNED
+    turned = dot(face_normals(neutral, faces[asked]), face_normals(moved, faces[asked])) < _HARDLY_TURNED
     asked = asked[turned]
     if not len(asked):
         return asked
     expected = _expected_normals(neutral, moved, faces, asked)
-    return asked[(expected * face_normals(moved, faces[asked])).sum(axis=1) < 0]
+    return asked[dot(expected, face_normals(moved, faces[asked])) < 0]
 
 
 def _expected_normals(neutral, moved, faces, asked):
     """(k, 3) normals of the faces `asked` at rest, turned as what is around each has turned."""
     touched = np.zeros(len(neutral), bool)
     touched[faces[asked]] = True
-    covariance = _vertex_covariance(neutral, moved, faces[touched[faces].any(axis=1)])
+    covariance = _vertex_covariance(neutral, moved, faces[touching(touched, faces)])
     around = covariance[faces[asked]].sum(axis=1)  # (k, 3, 3)
     U, _, Vt = np.linalg.svd(around)
     flip = np.linalg.det(U @ Vt) < 0
@@ -62,7 +62,7 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
     shared out among its corners by the area's gradient, again and again (position-based constraints: Mueller et al.
     2007). mobility (n,) 0..1: how readily a vertex gives way. Where nothing is folded, moved itself is returned
     """
-    folded = folded_by_shape(neutral, moved, faces, mobility[faces].any(axis=1))
+    folded = folded_by_shape(neutral, moved, faces, touching(mobility != 0.0, faces))
     if not len(folded):
         return moved
     near = np.zeros(len(moved), bool)
@@ -70,10 +70,11 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
     near = dilate(near, faces, _RINGS)
     # What is expected of a face depends on the ring around it, which is looked at and stays.
     around = dilate(near, faces, 1)
-    used, local = np.unique(faces[around[faces].all(axis=1)], return_inverse=True)
+    used, local = np.unique(faces[within(around, faces)], return_inverse=True)
     local = local.reshape(-1, 3)
     rest, start, ease = neutral[used], moved[used], np.where(near, mobility, 0.0)[used]
-    asked = np.flatnonzero(near[used][local].all(axis=1))
+    asked_about = within(near[used], local)
+    asked = np.flatnonzero(asked_about)
     area = face_areas(rest, local[asked])
     edge, least = float(np.sqrt(2.0 * area.mean())), _LEAST_SHARE * area
     now, best, fewest = start, start, len(folded)
@@ -84,7 +85,7 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
             if way is None:
                 break
             now = start + _shortened(now + _shortened(way, _STEP * edge) - start, _FARTHEST * edge)
-        left = len(folded_by_shape(rest, now, local, near[used][local].all(axis=1)))
+        left = len(folded_by_shape(rest, now, local, asked_about))
         if left < fewest:
             best, fewest = now, left
         if not left:
@@ -96,13 +97,13 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
 
 def _shortened(vectors, longest):
     """Rows of vectors no longer than that."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    length = lengths(vectors)[:, None]
     return vectors * np.minimum(1.0, longest / np.maximum(length, 1e-12))
 
 
 def _way_back(points, faces, normals, least, ease):
     """(n, 3) steps that spread faces (k, 3) whose area along normals (k, 3) is under least (k,), or None."""
-    area = 0.5 * (face_cross(points, faces) * normals).sum(axis=1)
+    area = 0.5 * dot(face_cross(points, faces), normals)
     small = np.flatnonzero(area < least)
     if not len(small):
         return None

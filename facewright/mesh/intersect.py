@@ -19,8 +19,9 @@ def self_intersections(vertices, faces, mask=None):
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     _, pairs, coplanar = igl.predicates.find_self_intersections(vertices, subset)
     pairs = np.asarray(pairs).reshape(-1, 2)[np.asarray(coplanar).reshape(-1) == 0]
-    shared = (subset[pairs[:, 0]][:, :, None] == subset[pairs[:, 1]][:, None, :]).any(axis=(1, 2))
-    return np.unique(np.sort(chosen[pairs[~shared]], axis=1), axis=0)
+    one, other = subset.T[:, pairs[:, 0]], subset.T[:, pairs[:, 1]]
+    apart = np.logical_and.reduce([a != b for a in one for b in other])
+    return np.unique(np.sort(chosen[pairs[apart]], axis=1), axis=0)
 
 
 def intersections_of(vertices, faces, asked):

@@ -18,9 +18,22 @@ def cross(a, b):
     return result
 
 
+def dot(a, b):
+    """(k,) products of rows (k, 3)."""
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
+def lengths(vectors):
+    """(...) lengths of vectors (..., d); numpy's own sums take several times as long over short rows."""
+    squared = vectors[..., 0] * vectors[..., 0]
+    for i in range(1, vectors.shape[-1]):
+        squared = squared + vectors[..., i] * vectors[..., i]
+    return np.sqrt(squared)
+
+
 def normalized(vectors):
-    """Rows scaled to unit length; a zero row stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    """Vectors (..., d) scaled to unit length; a zero one stays zero."""
+    length = lengths(vectors)[..., None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
@@ -31,7 +44,7 @@ def face_normals(V, F):
 
 def face_areas(V, F):
     """(m,) areas."""
-    return 0.5 * np.linalg.norm(face_cross(V, F), axis=1)
+    return 0.5 * lengths(face_cross(V, F))
 
 
 def vertex_normals(V, F):

@@ -17,29 +17,34 @@ def overlap_along(one, other, direction):
     returns    (k,) greatest height of the first less that of the second over the same place, -inf where they do not lie
                over each other; where that is: barycentric (k, 3) of the first and of the second
     """
-    k = len(one)
     frame = _planes(direction)
     (p, up), (q, uq) = (_seen(triangle, *frame, direction) for triangle in (one, other))
-    best, a, b = np.full(k, -np.inf), np.zeros((k, 3)), np.zeros((k, 3))
+    at, there, valid = (np.concatenate(parts, axis=1) for parts in zip(_corners_over(p, q), _edges_over(p, q)))
+    height = np.where(valid, (at * up[:, None]).sum(axis=2) - (there * uq[:, None]).sum(axis=2), -np.inf)
+    best, each = height.argmax(axis=1), np.arange(len(one))
+    over = valid.any(axis=1)[:, None]
+    return height[each, best], np.where(over, at[each, best], 0.0), np.where(over, there[each, best], 0.0)
 
-    def offer(at, there, valid):
-        height = np.einsum("ki,ki->k", at, up) - np.einsum("ki,ki->k", there, uq)
-        better = valid & (height > best)
-        best[better], a[better], b[better] = height[better], at[better], there[better]
 
-    for i in range(3):
-        corner = np.broadcast_to(np.eye(3)[i], (k, 3))
-        for under, mine, points in ((True, q, p[:, i]), (False, p, q[:, i])):
-            share = _barycentric(mine, points)
-            offer(*((corner, share) if under else (share, corner)), (share >= -_ON_EDGE).all(axis=1))
-    for i in range(3):
-        for j in range(3):
-            t, s = _where_edges_pass(p[:, i], p[:, i - 2], q[:, j], q[:, j - 2])
-            at, there = np.zeros((k, 3)), np.zeros((k, 3))
-            at[:, i], at[:, i - 2] = 1.0 - t, t
-            there[:, j], there[:, j - 2] = 1.0 - s, s
-            offer(at, there, (t >= 0.0) & (t <= 1.0) & (s >= 0.0) & (s <= 1.0))
-    return best, a, b
+def _corners_over(p, q):
+    """Places where a corner of one triangle lies over the other, p, q (k, 3, 2): barycentric (k, 6, 3) of both and
+    (k, 6) bool: so it does."""
+    corner = np.broadcast_to(np.eye(3), (len(p), 3, 3))
+    of_q, of_p = _barycentric(q, p), _barycentric(p, q)
+    at, there = np.stack([corner, of_p], axis=2), np.stack([of_q, corner], axis=2)
+    inside = np.minimum(at, there).min(axis=3) >= -_ON_EDGE
+    return at.reshape(-1, 6, 3), there.reshape(-1, 6, 3), inside.reshape(-1, 6)
+
+
+def _edges_over(p, q):
+    """The same where edges of the two pass each other: (k, 9, 3) twice and (k, 9)."""
+    i, j = np.divmod(np.arange(9), 3)
+    t, s = _where_edges_pass(p[:, i], p[:, i - 2], q[:, j], q[:, j - 2])
+    at, there = np.zeros((len(p), 9, 3)), np.zeros((len(p), 9, 3))
+    edge = np.arange(9)
+    at[:, edge, i], at[:, edge, i - 2] = 1.0 - t, t
+    there[:, edge, j], there[:, edge, j - 2] = 1.0 - s, s
+    return at, there, (t >= 0.0) & (t <= 1.0) & (s >= 0.0) & (s <= 1.0)
 
 
 def crossing_points(one, other):
@@ -76,21 +81,22 @@ def _seen(triangle, u, v, direction):
 
 
 def _cross(a, b):
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _barycentric(triangle, points):
-    """(k, 3) of points (k, 2) in triangles (k, 3, 2); those of no area hold nothing."""
-    e, f, to = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0], points - triangle[:, 0]
+    """(k, c, 3) of points (k, c, 2) in triangles (k, 3, 2); those of no area hold nothing."""
+    a = triangle[:, :1]
+    e, f, to = triangle[:, 1:2] - a, triangle[:, 2:] - a, points - a
     area = _cross(e, f)
     flat = np.abs(area) < _NOTHING
     area = np.where(flat, 1.0, area)
     second, third = _cross(to, f) / area, _cross(e, to) / area
-    return np.where(flat[:, None], -1.0, np.stack([1.0 - second - third, second, third], axis=1))
+    return np.where(flat[..., None], -1.0, np.stack([1.0 - second - third, second, third], axis=-1))
 
 
 def _where_edges_pass(a, b, c, d):
-    """Shares (k,), (k,) of the edges a-b and c-d (k, 2) at which they pass each other; -1 where they are parallel."""
+    """Shares (...), (...) of edges a-b and c-d (..., 2) at which they pass each other; -1 where they are parallel."""
     r, s, to = b - a, d - c, c - a
     turn = _cross(r, s)
     parallel = np.abs(turn) < _NOTHING

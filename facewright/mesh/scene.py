@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from facewright.mesh.adjacency import touching
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.mesh.raster import RayScene
 from facewright.mesh.render import BACKGROUND, CLAY, LIGHTS, linear_to_srgb, srgb_to_linear
@@ -122,21 +123,23 @@ class Scene:
         image = np.zeros((len(origins), 3), np.float32)
         through = np.ones(len(origins), np.float32)
         active = np.arange(len(origins))
-        start = origins
+        start, way = origins, directions
         for _ in range(MAX_LAYERS):
-            hits = self.rays.cast(start, directions[active])
-            met = hits.face >= 0
-            active, hits_at = active[met], np.flatnonzero(met)
+            hits = self.rays.cast(start, way)
+            hits_at = np.flatnonzero(hits.face >= 0)
+            active = active[hits_at]
             if not len(active):
                 break
-            face, barycentric = self._near[hits.face[met]], hits.barycentric[met].astype(np.float32)
+            face, barycentric = self._near[hits.face[hits_at]], hits.barycentric[hits_at].astype(np.float32)
             color, opacity = self._shade(face, barycentric, camera, pixel_mm, unlit)
-            image[active] += color * (through[active] * opacity)[:, None]
-            through[active] *= 1.0 - opacity
-            onward = through[active] > 0.01
-            reach = (hits.distance[hits_at] + 0.01)[:, None]
-            start = (start[hits_at] + directions[active] * reach)[onward]
-            active = active[onward]
+            light = through[active]
+            image[active] += color * (light * opacity)[:, None]
+            light *= 1.0 - opacity
+            through[active] = light
+            onward = light > 0.01
+            active, hits_at = active[onward], hits_at[onward]
+            way = directions[active]
+            start = start[hits_at] + way * (hits.distance[hits_at] + 0.01)[:, None]
             if not len(active):
                 break
         return image + through[:, None] * background
@@ -220,7 +223,7 @@ def _normals_of(vertices, faces, chosen):
     if len(chosen) < len(faces):
         touched = np.zeros(len(vertices), bool)
         touched[faces[chosen]] = True
-        faces = faces[touched[faces].any(axis=1)]
+        faces = faces[touching(touched, faces)]
     return vertex_normals(vertices, faces)
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.data import Template
 from facewright.mesh.radial import RadialTable, radial_table
 from facewright.solve.procrustes import best_similarity
 
 _LEAST_BULGE = 0.02  # of the radius: an eye that bulges less than this has no cornea
+_MEASURED: WeakKeyDictionary[Template, dict[str, Eyeball]] = WeakKeyDictionary()
 _LID_SLOPE = 0.3  # how quickly a lid gains thickness away from its margin
 
 
@@ -68,14 +71,19 @@ def measure_eyeball(template, side):
 
     The radius is that of the ball's back half, where no cornea is. The axis goes through the middle of what bulges out
     most, which is the cornea. The surface is the outermost of the eye's parts; both eyes' quads count, however they are
-    cut. The left eye is measured; the right one is its mirror image to the last bit.
+    cut. The left eye is measured, once for a template; the right one is its mirror image to the last bit.
     """
-    if side == "right":
-        return _mirrored(measure_eyeball(template, "left"))
-    center = template.skeleton.positions[template.skeleton.names.index(f"eye_{side}")]
-    ball = template.vertices[template.part(f"eye_{side}").vertex_slice] - center
+    if template not in _MEASURED:
+        left = _left_eyeball(template)
+        _MEASURED[template] = {"left": left, "right": _mirrored(left)}
+    return _MEASURED[template][side]
+
+
+def _left_eyeball(template):
+    center = template.skeleton.positions[template.skeleton.names.index("eye_left")]
+    ball = template.vertices[template.part("eye_left").vertex_slice] - center
     radius = float(np.median(np.linalg.norm(ball[ball[:, 2] < 0], axis=1)))
-    offset = np.concatenate([template.vertices[part.vertex_slice] for part in eye_parts(template, side)]) - center
+    offset = np.concatenate([template.vertices[part.vertex_slice] for part in eye_parts(template, "left")]) - center
     distance = np.linalg.norm(offset, axis=1)
     bulge = np.maximum(distance - radius, 0.0) * (offset[:, 2] > 0)
     axis = (bulge**2) @ (offset / distance[:, None])

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.evaluate.play import Player
+from facewright.mesh.adjacency import differing, dilate
 from facewright.mesh.scene import CLAY_LINEAR, Drawable, Scene
 from facewright.write.sheet import PANEL
 
@@ -69,11 +70,11 @@ class Puppet:
         for mesh, now, shade, rest, lit in zip(self._meshes, vertices, shades, *self._rest):
             if now is rest and shade is lit:
                 continue
-            touched = (now != rest).any(axis=1)
+            touched = differing(now, rest)
             if shade is not None:
                 touched |= shade != lit
-            for _ in range(2):  # a vertex turns the normals of its neighbours, which light the faces around them
-                touched[mesh.faces[touched[mesh.faces].any(axis=1)]] = True
+            # A vertex turns the normals of its neighbours, which light the faces around them.
+            touched = dilate(touched, mesh.faces, 2)
             corners += [rest[touched], now[touched]]
         corners = np.concatenate(corners) if corners else np.zeros((0, 3))
         if not len(corners):
