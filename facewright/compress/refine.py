@@ -193,7 +193,8 @@ def smooth_weights(stencil, right, weights, smooth, sweeps=SWEEPS):
     jobs = []  # one list for each colour; cells of a colour are no neighbours, hence bands may run side by side
     for y0, x0 in ((0, 0), (0, 1), (1, 0), (1, 1)):
         bands = _bands(len(range(y0, rows, 2)))
-        jobs.append([_Colour(y0 + 2 * band.start, y0 + 2 * band.stop, x0) for band in bands])
+        # A map of one column has no cells of every colour.
+        jobs.append([_Colour(y0 + 2 * band.start, y0 + 2 * band.stop, x0) for band in bands if x0 < columns])
     in_threads(lambda job: job.prepare(stencil, right, around), [job for colour in jobs for job in colour])
     for _ in range(sweeps):
         for colour in jobs:

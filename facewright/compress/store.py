@@ -10,14 +10,13 @@ from facewright.compress.threads import in_threads
 from facewright.compress.tiles import TEXELS
 
 
-def store_solution(tiles, weights, k, *, held=(), exact=False, report):
-    """Quantised weights, the difference textures that suit them best, and these quantised."""
+def store_solution(tiles, weights, k, ridge, *, held=(), exact=False, report):
+    """Quantised weights, the difference textures that suit them best (ridge: per texture), and these quantised."""
     weights = np.ascontiguousarray(weights.transpose(2, 0, 1, 3))  # (N, rows, columns, K)
     codes, step, zero = quantise_weights(weights)
     stored = ((codes.astype(np.float32) - zero[:, None, None]) * step[:, None, None]).astype(np.float32)
-    # Few textures leave little noise to damp: a smaller ridge then costs no range.
-    ridge = (1e-6 if exact else 1e-4 if tiles.count <= 4 else 0.01) * tiles.count
-    d = Pass(tiles, k, held).textures(stored.transpose(1, 2, 0, 3), ridge)
+    seen = stored if tiles.emphasis is None else stored * tiles.emphasis[:, None, None]
+    d = Pass(tiles, k, held).textures(seen.transpose(1, 2, 0, 3), ridge * tiles.count)
     parts = quantise_textures(tiles, d, held=range(k) if exact else range(len(held)))
     return stored_parts(parts, (codes, step, zero), report)
 

@@ -134,6 +134,7 @@ class TextureTiles:
         most = np.iinfo(neutral.dtype).max
         self.levels = np.full(neutral.shape[2], most) if levels is None else np.asarray(levels)
         self.gain = np.ones((neutral.shape[2], 1), np.float32)  # how much a difference of a channel counts
+        self.emphasis = None  # (N, 1) float32, how much a texture's differences count; None: all alike
         height, width, self.channels = neutral.shape
         self.grid = Grid(height, width)
         self.count = count
@@ -185,8 +186,12 @@ class TextureTiles:
         return [slice(start, min(start + size, len(self))) for start in range(0, len(self), size)]
 
     def differences(self, part, whole=False):
-        """(tiles, N, C * 64) float32 in 0-255, times scale and gain; whole: as they are, uncovered texels too."""
+        """(tiles, N, C * 64) float32 in 0-255, times emphasis, scale and gain; whole: uncovered texels too, without
+        scale and gain."""
         x = self.data[part].astype(np.float32)
         x -= self.neutral[part, None].astype(np.float32)
         x *= np.float32(self.unit) if whole else self.scale[part, None] * (self.gain * np.float32(self.unit))
-        return x.reshape(len(x), self.count, self.channels * TEXELS)
+        x = x.reshape(len(x), self.count, self.channels * TEXELS)
+        if self.emphasis is not None:
+            x *= self.emphasis
+        return x

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from facewright.compress import FacezipOptions, example_weights, facezip, facezip_decode
 from facewright.compress.masks import build_masks
@@ -71,6 +72,44 @@ def test_the_report_is_what_decoding_gives_and_better_than_constant_weights():
     assert np.abs(np.array(decoded) - list(packed.report["rmse"].values())).max() < 0.2
     constant = facezip(neutral, images, options=FacezipOptions(iterations=0))
     assert packed.report["mean_rmse"] < 0.7 * constant.report["mean_rmse"]
+
+
+def test_no_texture_is_worse_than_with_constant_weights():
+    """Strengths of 0.3 to 27 codes: constant weights hold the strongest almost exactly; half a code is rounding."""
+    rng = np.random.default_rng(7)
+    neutral = np.full((128, 128, 3), 128, np.uint8)
+    places = gaussian_filter(rng.standard_normal((16, 8, 128, 128)), (0, 0, 12, 12)) / 0.024
+    grain = gaussian_filter(rng.standard_normal((8, 128, 128)), (0, 1, 1)) / 0.28
+    fields = np.einsum("nphw,phw->nhw", places, grain) / np.sqrt(8)
+    images = [128 + 0.3 * 1.35**n * field[:, :, None] * np.ones(3) for n, field in enumerate(fields)]
+    images = [np.clip(np.rint(image), 0, 255).astype(np.uint8) for image in images]
+    constant = facezip(neutral, images, options=FacezipOptions("pca")).report
+    packed = facezip(neutral, images).report
+    assert packed["mean_rmse"] < 0.8 * constant["mean_rmse"]
+    assert all(packed["rmse"][name] < max(constant["rmse"][name], 0.5) for name in constant["rmse"])
+
+
+def test_what_four_textures_span_nearly_is_not_damped():
+    """Five components of which the last is weak: the error is PCA(4) in float and the rounding of eight bits."""
+    rng = np.random.default_rng(1)
+    parts = gaussian_filter(rng.standard_normal((5, 96, 96, 3)), (0, 3, 3, 0))
+    parts *= np.array([40, 25, 20, 20, 1.0])[:, None, None, None] / parts.std()
+    images = [128 + np.tensordot(row, parts, 1) for row in rng.normal(0, 1, (16, 5)).clip(-0.7, 0.7)]
+    images = [np.clip(np.rint(image), 0, 255).astype(np.uint8) for image in images]
+    neutral = np.full((96, 96, 3), 128, np.uint8)
+    x = np.stack(images).reshape(16, -1) - 128.0
+    left = np.linalg.eigvalsh(x @ x.T)[:-4].clip(0)
+    float_rms = np.sqrt(left.sum() / x.size)
+    constant, refined = (facezip(neutral, images, options=FacezipOptions(method)) for method in ("pca", "refined"))
+    assert refined.report["mean_rmse"] < constant.report["mean_rmse"] < float_rms + 0.03
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (3, 2), (40, 7), (7, 40)])
+def test_images_no_wider_than_a_weight_texel(shape):
+    images = [np.random.default_rng(n).integers(0, 256, (*shape, 3)).astype(np.uint8) for n in range(12)]
+    packed = facezip(images[0], images[1:])
+    constant = facezip(images[0], images[1:], options=FacezipOptions("pca"))
+    assert packed.report["mean_rmse"] <= constant.report["mean_rmse"] + 0.3
 
 
 def test_a_kept_texture_is_exact():
