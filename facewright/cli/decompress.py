@@ -39,20 +39,21 @@ def run(options):
 
 
 def parse_weights(text):
-    """dict name -> weight of "a=1,b=0.5"; a comma before the next = belongs to a name."""
+    """dict name -> weight of "a=1,b=0.5"; a comma that no "=number" precedes belongs to a name."""
     weights, item = {}, ""
     for part in text.split(","):
         if not item and not part.strip():
             continue
         item += part
         name, equals, value = item.rpartition("=")
-        if not equals:
-            item += ","
-            continue
         try:
-            weights[name.strip()], item = float(value), ""
+            weight = float(value) if equals else None
         except ValueError:
-            break
+            weight = None
+        if weight is None:
+            item += ","
+        else:
+            weights[name.strip()], item = weight, ""
     if item or not all(map(math.isfinite, weights.values())):
         raise InputError(
             f"decompress: --weights {text!r} is no list of NAME=WEIGHT; write for example smile=0.7,browDown=1"

@@ -146,7 +146,7 @@ def _write_plots(result, textures, folder):
     axes.set_xticks(range(len(textures.names)), textures.names, rotation=60, ha="right", fontsize=7)
     axes.set_ylabel("RMSE, 0-255")
     axes.set_title("Reconstruction error of every texture")
-    axes.legend(fontsize=8)
+    figure.legend(loc="outside right upper", fontsize=8)
     save(figure, "errors.png")
     if "search" in result:
         save(_search_figure(Figure((6, 4), layout="constrained"), result["search"]), "permutation.png")
@@ -175,7 +175,7 @@ def _mask_figure(figure, rows):
     axes.plot(rows[:, 0], rows[:, 2], "o--", label="no permutation")
     axes.set_xlabel("masks")
     axes.set_ylabel("mean RMSE, 0-255")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, 1.1 * rows[:, 1:3].max())
     axes.set_title("Error against the number of masks")
     axes.legend()
     return figure

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from itertools import permutations
+from math import factorial, isqrt
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from facewright.errors import InputError
 
 MOST_BLOCKS = 64
 MASK_CHOICES = (13, 33, 53, 83)
+# Entries of the table of the search, which needs 24 bytes for each while it is made: 589 masks of 4 textures, 117 of 5.
+MOST_ENTRIES = 200_000_000
 
 
 def coarse_grams(tiles, masks):
@@ -284,6 +287,11 @@ def best_published(tiles, k, options, mesh, region, progress):
 
 
 def _encode_published(tiles, k, options, mesh, region, progress):
+    most = isqrt(MOST_ENTRIES) // factorial(max(k, 4))
+    if min(options.masks, len(mesh.vertices)) > most:
+        raise InputError(
+            f"compress: {options.masks} masks are too many to search with {k} difference textures; {most} are possible"
+        )
     masks, about = build_masks(mesh, tiles.grid, options.masks, seed=options.seed, region=region)
     weights, shares, cost = published_solution(tiles, masks, k, options.seed, options.permute, progress)
     n = tiles.count

@@ -216,6 +216,7 @@ def test_tables_that_say_too_little_are_refused(tmp_path, command, capsys, rows,
         ("smile=0.5, jaw=1", {"smile": 0.5, "jaw": 1}),
         ("a,b=1,c=d=-2", {"a,b": 1, "c=d": -2}),
         ("x, y=1 , z=2,", {"x, y": 1, "z": 2}),
+        ("q=,1=0.5,2,a=1", {"q=,1": 0.5, "2,a": 1}),
         ("", {}),
     ],
 )

@@ -8,8 +8,9 @@ import pytest
 from facewright.compress import FacezipOptions, facezip
 from facewright.compress.masks import build_masks
 from facewright.compress.published import PermutationSearch, best_published, cluster_fragments, published_search
-from facewright.compress.synthetic import expression_set
+from facewright.compress.synthetic import bowl, expression_set
 from facewright.compress.tiles import TextureTiles
+from facewright.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -63,3 +64,10 @@ def test_permutation_helps_and_a_budget_chooses_masks(made):
     options = FacezipOptions("paper", budget=10**9)
     result, _ = best_published(tiles, 4, options, made.mesh, None, lambda stage, share: None)
     assert result["report"]["masks"] in (13, 33, 53, 83)
+
+
+def test_more_masks_than_the_search_can_hold_are_refused():
+    made = expression_set(64, 6)
+    dense = bowl(rings=40, spokes=40)
+    with pytest.raises(InputError, match="1500 masks are too many .* 589 are possible"):
+        facezip(made.neutral, made.textures, mesh=dense, options=FacezipOptions("paper", masks=1500))
