@@ -178,8 +178,8 @@ def print_summary(packed, about, reader, examples, results):
         print(f"{name}: {stored}, {whole - reading:.1f} s, reading {reading:.1f} s")
         print(f"{name}: RMSE {report['mean_rmse']:.2f} of 255, worst {worst} {rmse[worst]:.2f}")
         if "masks" in report:
-            radius, lowest = report["radius_mm"], report["lowest_before_clip"]
-            print(f"{name}: {counted(report['masks'], 'mask')} {radius:.1f} apart, down to {lowest:.2f} before clipping")
+            masks, radius = counted(report["masks"], "mask"), report["radius_mm"]
+            print(f"{name}: {masks} {radius:.1f} apart, down to {report['lowest_before_clip']:.2f} before clipping")
         if report["solution"] == "exact":
             step = one.texture_step[(one.textures != one.texture_zero[:, None, None]).any(axis=(1, 2))].max(initial=0)
             print(f"{name}: exact but for the rounding of the stored step, {step:.3f} of 255")

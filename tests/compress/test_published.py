@@ -69,5 +69,5 @@ def test_permutation_helps_and_a_budget_chooses_masks(made):
 def test_more_masks_than_the_search_can_hold_are_refused():
     made = expression_set(64, 6)
     dense = bowl(rings=40, spokes=40)
-    with pytest.raises(InputError, match="1500 masks are too many .* 589 are possible"):
+    with pytest.raises(InputError, match=r"1500 masks are too many .* 589 are possible"):
         facezip(made.neutral, made.textures, mesh=dense, options=FacezipOptions("paper", masks=1500))
