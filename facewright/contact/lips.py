@@ -21,7 +21,7 @@ from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.laplacian import lumped_mass
-from facewright.mesh.normals import lengths, normalized, vertex_normals
+from facewright.mesh.normals import dot, lengths, normalized, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.spread import SoftSpread
 from facewright.mesh.winding import winding_numbers
@@ -241,8 +241,10 @@ class LipContact:
     def _lip_wishes(self, skin, watches):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
         normals = vertex_normals(skin, self._about_lips)
-        *both, watches = zip(*(self._entered(skin, normals, side, watch) for side, watch in enumerate(watches)))
+        *both, watches = zip(*(self._behind(skin, normals, side, watch) for side, watch in enumerate(watches)))
         index, corners, share, way = map(np.concatenate, both)
+        inside = self._in_flesh(skin, normals, index)
+        index, corners, share, way = index[inside], corners[inside], share[inside], way[inside]
         wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
         at = np.concatenate([index[:, None], corners], axis=1).ravel()
         weight = np.concatenate([np.ones((len(index), 1)), share], axis=1).ravel()
@@ -257,8 +259,8 @@ class LipContact:
         asked = skin[index] + _ASIDE_MM * normals[index]
         return winding_numbers(skin, self.faces, asked) + self._beyond[index] > 0.5
 
-    def _entered(self, skin, normals, side, watch):
-        """Vertices (k,) of a lip that lie in the other one, with the corners (k, 3) of the triangle they have passed,
+    def _behind(self, skin, normals, side, watch):
+        """Vertices (k,) of a lip that lie behind the other one, with the corners (k, 3) of the triangle next to them,
         their shares of it (k, 3) and the way out (k, 3); and the Watch for the next pose."""
         mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
         points, other = skin[mine], skin[self.sides[1 - side]]
@@ -271,14 +273,12 @@ class LipContact:
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
         way, depth = found.points - points[due], found.distance
-        behind = (way * normal).sum(axis=1) > 0
+        behind = dot(way, normal) > 0
         maybe = behind & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
-        inside = np.flatnonzero(maybe)
-        inside = inside[self._in_flesh(skin, normals, mine[due[inside]])]
         watch = watch.answered(due, np.where(behind, 0.0, depth))
-        out = way[inside] + self.options.gap_mm * normal[inside]
-        return mine[due[inside]], corners[inside], found.barycentric[inside], out, watch
+        out = way[maybe] + self.options.gap_mm * normal[maybe]
+        return mine[due[maybe]], corners[maybe], found.barycentric[maybe], out, watch
 
 
 def _winding(vertices, faces, points):
