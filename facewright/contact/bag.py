@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
-from facewright.mesh.normals import dot, vertex_normals
+from facewright.mesh.normals import dot, lengths, vertex_normals
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,8 @@ class MouthBag:
         self.shares = np.tile(_SAMPLES, (len(mine), 1))
         self._place = _same_place(self.corners, self.shares)
         self._rim = border_vertices(self.patch, len(vertices))
-        depth = np.nan_to_num(-self._heights(vertices, np.arange(len(mine) * len(_SAMPLES)))[0], posinf=0.0)
+        before = self.before(vertices)
+        depth = np.nan_to_num(-self.heights(before, vertices, np.arange(len(self.corners)))[0], posinf=0.0)
         near = (depth > self.options.least_mm) & (depth < self.options.most_mm)
         self.corners, self.shares = self.corners[near], self.shares[near]
         self._place = _same_place(self.corners, self.shares)
@@ -69,8 +70,10 @@ class MouthBag:
         """(n, 3) displacement that brings the lining of a pose (n, 3) back behind the outer skin."""
         moved, every = np.array(skin), np.arange(len(self.corners))
         asked = self._at_rest.at(self._samples(skin, every), skin[self._surface]).due()
+        before = self.before(skin)  # which does not give way
+        asked = asked[self._may_come_out(before, skin, asked)]
         for _ in range(self.options.rounds):
-            height, normal = self._heights(moved, asked)
+            height, normal = self.heights(before, moved, asked)
             over = height + self._wanted[asked]
             coming = (over > _NOTHING_MM) & (height < self.options.most_mm)
             if not coming.any():
@@ -89,16 +92,41 @@ class MouthBag:
         """(k, 3) points of the lining that are asked about."""
         return np.einsum("kc,kcd->kd", self.shares[index], skin[self.corners[index]])
 
-    def _heights(self, skin, index):
+    def before(self, skin):
+        """The outer skin of a pose (n, 3) that lining could come out of."""
+        return _Before(skin, self.patch, self._around, self._rim)
+
+    def heights(self, before, skin, index):
         """(k,) how far samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
         _, first, again = np.unique(self._place[index], return_index=True, return_inverse=True)
-        points = self._samples(skin, index[first])
-        found = Surface(skin, self.patch).closest(points)
-        normal = interpolate(vertex_normals(skin, self._around), self.patch, found.faces, found.barycentric)
+        height, normal, _ = before.heights(self._samples(skin, index[first]))
+        return height[again], normal[again]
+
+    def _may_come_out(self, before, skin, index):
+        """(k,) bool of samples: a corner of their face may be too near to the outer skin to vouch for them."""
+        vertices, place = np.unique(self.corners[index], return_inverse=True)
+        height, _, distance = before.heights(skin[vertices])
+        depth = np.where(height < 0.0, distance, 0.0)[place.reshape(-1, 3)]
+        away = lengths(skin[self.corners[index]] - self._samples(skin, index)[:, None])
+        return (depth - away).max(axis=1, initial=0.0) <= self._wanted[index]
+
+
+class _Before:
+    """The outer skin of a pose (n, 3) that lining could come out of: faces patch (m, 3), those around it for normals,
+    rim (n,) bool of the patch."""
+
+    def __init__(self, skin, patch, around, rim):
+        self._patch, self._rim = patch, rim
+        self._surface, self._normals = Surface(skin, patch), vertex_normals(skin, around)
+
+    def heights(self, points):
+        """(k,) mm by which points (k, 3) lie outside of it, -inf past its rim, where no such skin lies before them; the
+        normals (k, 3) there; and distances (k,)."""
+        found = self._surface.closest(points)
+        normal = interpolate(self._normals, self._patch, found.faces, found.barycentric)
         height = dot(points - found.points, normal)
-        # Past its rim no such skin lies before the lining.
-        beyond = (self._rim[self.patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
-        return np.where(beyond, -np.inf, height)[again], normal[again]
+        beyond = (self._rim[self._patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
+        return np.where(beyond, -np.inf, height), normal, found.distance
 
 
 def _same_place(corners, shares):

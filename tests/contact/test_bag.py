@@ -26,7 +26,8 @@ def test_what_comes_out_goes_back_and_outer_skin_stays(bag, hm08):
     pressed = V.copy()
     pressed[chin, 2] -= 7.0
     every = np.arange(len(lining.corners))
-    before = lining._heights(pressed, every)[0].max()
+    skin = lining.before(pressed)
     push = lining.tucked(pressed)
-    assert before > 0.5 and lining._heights(pressed + push, every)[0].max() < 0.1
+    assert lining.heights(skin, pressed, every)[0].max() > 0.5
+    assert lining.heights(skin, pressed + push, every)[0].max() < 0.1
     assert not push[outer].any() and np.abs(push).max() < 12.0
