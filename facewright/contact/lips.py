@@ -50,7 +50,7 @@ class LipOptions:
 
     lip_mm: float = 12.0
     near_mm: float = 20.0
-    smooth_mm: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0) + (0.8,) * 9
+    smooth_mm: tuple[float, ...] = (3.0, 3.0, 2.0, 2.0, 1.5, 1.0) + (0.8,) * 5
     reach_mm: float = 4.0
     tie_mm: float = 1.5
     tied_mm: float = 6.0
@@ -59,7 +59,7 @@ class LipOptions:
     rest_mm: float = 0.1
     teeth_mm: float = 0.1
     off_mm: float = 0.3
-    weights: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)
+    weights: tuple[float, ...] = (0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 class _Watches(NamedTuple):
@@ -144,12 +144,16 @@ class LipContact:
         weights  at which contact is solved; default: options.weights
         closed   the lips shall meet: pairs of the seam stay together while the rest moves apart, locally
         shut     no slit shall open between them where they give way
+
+        The way is walked: each round asks one weight more, from where the correction acts least. Asked at its end at
+        once, lips that have gone 3 mm through each other part to the wrong side here and there.
         """
         field = np.zeros((len(self.used), 3))
         hold = np.zeros(len(self.used))
         most_weight = self._where_it_acts_most(weights, acts)
-        poses = {weight: self.V + motion(weight) for weight in weights or self.options.weights}
-        asked, left, watches, last = list(poses), {}, {}, self._at_rest
+        way = sorted(weights or self.options.weights, key=acts or (lambda weight: weight))
+        poses = {weight: self.V + motion(weight) for weight in way}
+        asked, left, watches, last = way[:1], dict.fromkeys(way, np.inf), {}, self._at_rest
         solved = {}  # the field with which a pose was asked last
         best, least = field, np.inf  # rounds may swing where lips and teeth both push
         for width in (*(_LOCAL_MM if closed else self.options.smooth_mm), None):
@@ -175,8 +179,11 @@ class LipContact:
                 best, least = field, max(left.values())
             if met and width is not None:
                 field = self.spread(field + total, _PIN * hold, width)
+            if len(solved) < len(way):
+                asked = way[: len(solved) + 1]
+                continue
             # What was free stays unasked until the rest is free: most of a path never touches.
-            asked = met or [weight for weight in poses if solved[weight] is not field]
+            asked = met or [weight for weight in way if solved[weight] is not field]
             if not asked:
                 break
         return self._of_head(best)
