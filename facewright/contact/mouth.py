@@ -90,8 +90,6 @@ def solve_mouth(face, targets, options=None, jobs=1):
     mouth = _Mouth(face, options or MouthOptions(), jobs)
     result = mouth.with_arc(targets)
     result = mouth.with_single_shapes(mouth.with_flat_corners(result))
-    flat = mouth.with_flat_corners(result)  # what contact folds is laid flat once more
-    result = mouth.with_single_shapes(flat, changed_from=result)
     result = mouth.with_both_sides(result)
     result = mouth.with_halves(result)
     result = mouth.with_mouth_close(result)
@@ -130,11 +128,9 @@ class _Mouth:
         extras = targets.extras | {half: jaw.half_open(self.face.vertices, opened, HALF)}
         return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
 
-    def with_single_shapes(self, targets, changed_from=None):
-        """Targets of which each by itself keeps the lips apart on its whole way; only those that changed_from lacks."""
+    def with_single_shapes(self, targets):
+        """Targets of which each by itself keeps the lips apart on its whole way."""
         names = self._lip_shapes(targets)
-        if changed_from is not None:
-            names = [name for name in names if (targets.delta(name) != changed_from.delta(name)).any()]
         lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
         return _added(targets, [(lack, {name: 1.0}) for name, lack in zip(names, lacks)])
 
