@@ -74,12 +74,13 @@ def register(scan, landmarks, template, options=None, placed=()):
     closed = eyes_closed(pairs)
     edge_mm = face_edge_mm(scan.vertices, scan.faces)
     finely = edge_mm <= FACETS_MM
-    model, names = _fit_model(template, target.smoothed(edge_mm), pairs, closed, options.model, finely)
+    rules = skin_rules(template)
+    model, names = _fit_model(template, target.smoothed(edge_mm), rules, pairs, closed, options.model, finely)
     model = _with_ears(template, target, model)
     leading, line_stats = leading_lines(scan, template, model, pairs, closed)
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
-    rules, bald = without_hair(skin_rules(template), template, model.vertices, target)
+    rules, bald = without_hair(rules, template, model.vertices, target)
     hidden = _hidden_ears(template, target, model.vertices)[:stop]
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
     levels = LEVELS + DETAIL if finely else LEVELS
@@ -137,10 +138,9 @@ def _expressions(template, closed):
     return names, Expressions(deltas, expected, np.array([SMILE_STD] + [SHUT_STD] * len(lids)))
 
 
-def _fit_model(template, target, pairs, closed, options, finely):
+def _fit_model(template, target, rules, pairs, closed, options, finely):
     names, expressions = _expressions(template, closed)
     stop = template.skin.vertices[1]
-    rules = skin_rules(template)
     trust = np.zeros(len(template.vertices))
     trust[:stop] = rules.trust
     ears = template.regions["ear_left"] | template.regions["ear_right"]
