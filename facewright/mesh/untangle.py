@@ -44,14 +44,15 @@ def unfolded(vertices, faces, expected, keep, *, limit=0.2, rounds=40):
     A = vertex_adjacency(faces, len(vertices))
     degree = np.maximum(np.asarray(A.sum(axis=1)), 1)
     known = expected.any(axis=1)
+    faces, expected = faces[known], expected[known]
     for _ in range(rounds):
-        away = np.einsum("mc,mc->m", normalized(face_cross(moved, faces)), expected) < limit * known
+        away = np.einsum("mc,mc->m", normalized(face_cross(moved, faces)), expected) < limit
         loose = np.zeros(len(vertices), bool)
         loose[faces[away].ravel()] = True
         loose &= ~keep
         if not loose.any():
             break
-        moved[loose] = 0.5 * moved[loose] + 0.5 * ((A @ moved) / degree)[loose]
+        moved[loose] = 0.5 * moved[loose] + 0.5 * (A[loose] @ moved) / degree[loose]
     return moved
 
 
