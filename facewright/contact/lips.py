@@ -16,7 +16,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.contact.shut import LipSlit
-from facewright.contact.teeth import Teeth
 from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
@@ -75,7 +74,7 @@ class LipContact:
     vertices (n, 3) mm the neutral of the whole head; faces (m, 3) of its skin, the same on both sides (even_handed)
     seams    upper and lower line, paired, with shared ends
     outer    (n,) bool: skin that is seen
-    teeth    sequence of slices of the rows of teeth among the vertices, with their faces (from 0): (slice, faces)
+    teeth    rows_of_teeth of the head
     """
 
     def __init__(self, vertices, faces, seams, outer, teeth=(), options=None):
@@ -107,7 +106,7 @@ class LipContact:
         # The rest of the head closes the patch: its share of the winding number hardly changes with a pose.
         asked = rest + _ASIDE_MM * vertex_normals(rest, self.faces)
         self._beyond = _winding(vertices, faces, asked) - _winding(rest, self.faces, asked)
-        self.teeth = [(at, Teeth(vertices[at], own)) for at, own in teeth]
+        self.teeth = teeth
         in_teeth = [row.way_out(rest[self._guarded], vertices[at])[0] for at, row in self.teeth]
         self._in_teeth = [np.minimum(np.linalg.norm(way, axis=1), self.options.teeth_mm) for way in in_teeth]
         lips = [Watch(rest[mine], rest[other]) for mine, other in zip(self.sides, self.sides[::-1])]

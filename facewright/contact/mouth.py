@@ -14,6 +14,7 @@ from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
 from facewright.contact.mouth_close import MouthCloseOptions, mouth_close
 from facewright.contact.targets import is_even
+from facewright.contact.teeth import rows_of_teeth
 from facewright.contact.tongue import over_the_lip
 from facewright.conventions import (
     MOUTH_PAIRS,
@@ -107,8 +108,7 @@ class _Mouth:
         self.skin = template.skin.vertex_slice
         self.faces = even_cut(template.faces[template.skin.face_slice], template.mirror, template.vertices[:, 0])
         self.seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
-        rows = [part for part in template.parts if part.name.startswith("teeth")]
-        teeth = [(part.vertex_slice, template.faces[part.face_slice] - part.vertices[0]) for part in rows]
+        teeth = rows_of_teeth(template, face.vertices)
         skull = face.regions["skull"]
         still = skull if skull.any() else face.regions["outer"]
         self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
