@@ -178,11 +178,9 @@ class LipContact:
                 best, least = field, max(left.values())
             if met and width is not None:
                 field = self.spread(field + total, _PIN * hold, width)
-            if len(solved) < len(way):
-                asked = way[: len(solved) + 1]
-                continue
             # What was free stays unasked until the rest is free: most of a path never touches.
-            asked = met or [weight for weight in way if solved[weight] is not field]
+            stale = [weight for weight in way[: len(solved) + 1] if solved.get(weight) is not field]
+            asked = met if met and len(solved) == len(way) else stale
             if not asked:
                 break
         return self._of_head(best)
