@@ -29,6 +29,7 @@ _ASIDE_MM = 0.02  # a vertex is asked about this far in front of its own surface
 _MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
 _PIN = 100.0  # weight of a push against 1 mm2 of bending
 _NOTHING_MM = 1e-4
+_TRUSTED_MM = 1.0  # of a clearance: a lip ends, and farther off a vertex gets behind it without passing through it
 _LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
 _LEAST_SLOPE = 0.1  # of the lips' lines towards each other at a corner: there they are as near as they are to it
 
@@ -280,7 +281,7 @@ class LipContact:
         behind = dot(way, normal) > 0
         maybe = behind & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
-        watch = watch.answered(due, np.where(behind, 0.0, depth))
+        watch = watch.answered(due, np.where(behind, 0.0, np.minimum(depth, _TRUSTED_MM)))
         out = way[maybe] + self.options.gap_mm * normal[maybe]
         return mine[due[maybe]], corners[maybe], found.barycentric[maybe], out, watch
 

@@ -79,7 +79,10 @@ def part_lips(face, options=None):
     mouth = _Mouth(face, options or MouthOptions())
     still = np.zeros_like(face.vertices)
     clear = mouth.contact.apart(lambda weight: still, (1.0,), closed=True)
-    return replace(face, vertices=face.vertices + clear + mouth.contact.lifted(clear, mouth.forward))
+    clear = clear + mouth.contact.lifted(clear, mouth.forward)
+    if is_even(face):
+        clear = 0.5 * (clear + clear[face.template.mirror] * [-1.0, 1.0, 1.0])
+    return replace(face, vertices=face.vertices + clear)
 
 
 def solve_mouth(face, targets, options=None, jobs=1):

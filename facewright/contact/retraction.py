@@ -13,7 +13,7 @@ import numpy as np
 from facewright.mesh.normals import face_cross, normalized
 from facewright.mesh.raster import RayScene
 
-MOST_MM = 2.0
+MOST_MM = 5.0
 STEP_MM = 0.1
 _WEIGHTS = 0.25, 0.5, 0.75
 _YAW_DEG = -30.0, 0.0, 30.0  # from where a blink is looked at

@@ -56,6 +56,7 @@ def _twin(target, targets):
 
 
 def is_even(face):
-    """Whether a head is its own mirror image: then what rests on its middle line has no nearer side."""
-    mirrored = face.vertices[face.template.mirror] * [-1.0, 1.0, 1.0]
-    return bool(np.abs(mirrored - face.vertices).max() < _EVEN_MM)
+    """Whether a head's skin is its own mirror image: then what rests on its middle line has no nearer side."""
+    skin = face.template.skin.vertex_slice
+    mirrored = face.vertices[face.template.mirror[skin]] * [-1.0, 1.0, 1.0]
+    return bool(np.abs(mirrored - face.vertices[skin]).max() < _EVEN_MM)

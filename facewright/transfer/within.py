@@ -41,18 +41,22 @@ def keep_within_regions(face, deltas):
 def keep_within_amplitudes(face, deltas):
     """Shapes (s, n, 3) mm of a data.Face scaled so far as they are weaker or stronger than the working set says."""
     words, scale = read_working_set().words, scale_of(face)
-    outer = face.regions["outer"]
     seam = face.lines["lip_seam_upper"]  # from the person's right to the left
+    asked = {"corner_left": seam[[-1]], "corner_right": seam[[0]], "skin": face.regions["outer"]}
+    asked |= {part.name: part.vertex_slice for part in face.template.parts}
     result = np.array(deltas)
     for shape, name in zip(result, face.template.shape_names):
         word = words.get(name)
-        if word is None or word.region not in SCALED:
+        if word is None or not (word.region in SCALED or word.at == "tongue"):
             continue
-        at = seam[[-1 if word.side == "left" else 0]] if word.at == "corner" else outer
-        amplitude = float(np.linalg.norm(shape[at], axis=1).max(initial=0.0)) * scale
+        at = asked.get(f"corner_{word.side}" if word.at == "corner" else word.at)
+        amplitude = 0.0 if at is None else float(np.linalg.norm(shape[at], axis=1).max(initial=0.0)) * scale
         if amplitude > 0.0:
             least, most = word.amplitude
-            shape *= np.clip(amplitude, (1.0 + MARGIN) * least, (1.0 - MARGIN) * most) / amplitude
+            # With the tongue come jaw and lips, which go no farther for its sake.
+            shape[at if word.at == "tongue" else ...] *= (
+                np.clip(amplitude, (1.0 + MARGIN) * least, (1.0 - MARGIN) * most) / amplitude
+            )
     return result
 
 
