@@ -141,14 +141,23 @@ def blend_vector(packed, weights):
     return beta
 
 
-def quantise(values, low, high, levels, dtype):
-    """Integer codes 0 to levels of values between low and high (broadcast), with 0 itself a code: codes, step, zero."""
+def code_scale(low, high, levels):
+    """Step and zero of codes 0 to levels for values between low and high, with 0 itself a code."""
     low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
     step = (high - low) / levels
     step = np.where(step > 0, step, 1.0)
-    zero = np.rint(-low / step)
-    codes = np.clip(np.rint(values / step.astype(np.float32) + zero.astype(np.float32)), 0, levels).astype(dtype)
-    return codes, step, zero
+    return step, np.rint(-low / step)
+
+
+def nearest_codes(values, step, zero, levels):
+    """Codes 0 to levels (float, whole numbers) nearest to values (float32)."""
+    return np.clip(np.rint(values / step.astype(np.float32) + zero.astype(np.float32)), 0, levels)
+
+
+def quantise(values, low, high, levels, dtype):
+    """Integer codes 0 to levels of values between low and high (broadcast), with 0 itself a code: codes, step, zero."""
+    step, zero = code_scale(low, high, levels)
+    return nearest_codes(values, step, zero, levels).astype(dtype), step, zero
 
 
 def example_weights(packed, B):

@@ -28,7 +28,7 @@ def gram_matrix(tiles):
         x = tiles.differences(part)
         return (x @ x.transpose(0, 2, 1)).sum(axis=0, dtype=np.float64)
 
-    return sum(in_threads(one, tiles.chunks()))
+    return sum(in_threads(one, tiles.covered_chunks()), np.zeros((tiles.count, tiles.count)))
 
 
 def pca_weights(gram, k):
@@ -49,10 +49,13 @@ class Pass:
         self.tiles, self.k, self.fixed = tiles, k, tuple(fixed)
         self.basis = bilinear_basis()
         self.products = np.einsum("ap,bp->abp", self.basis, self.basis).reshape(16, TEXELS)
-        self.corners = tiles.grid.corner_cells()
+        self.corners, self.covered = tiles.grid.corner_cells(), tiles.covered_chunks()
 
-    def solve_textures(self, weights, part, ridge, x=None):
-        """D (tiles, K, C, 64) for weights (cells, N, K), and the objective of these tiles."""
+    def solve_textures(self, weights, part, ridge, x=None, nearest=None):
+        """D (tiles, K, C, 64) for weights (cells, N, K), the objective of these tiles, and their differences.
+
+        nearest  function (i, values of texture i) -> the nearest that can be stored
+        """
         tiles, k = self.tiles, self.k
         x = tiles.differences(part) if x is None else x
         corner = weights[self.corners[part]]  # (t, 4, N, K)
@@ -68,15 +71,15 @@ class Pass:
             for j in range(i + 1):
                 a[i, j] = np.ascontiguousarray(gram[:, :, i, :, j]).reshape(t, 16) @ self.products
         held = {i: x[:, n].reshape(t, tiles.channels, TEXELS) for i, n in enumerate(self.fixed)}
-        d = _solve_texels(a, b, k, ridge, held)
+        d = _solve_texels(a, b, k, ridge, held, nearest)
         value = -np.vdot(b, d)
         return d, value, x
 
     def gather(self, weights, ridge):
         """Objective, stencil (rows, columns, 3, 3, K, K) and right-hand side (rows, columns, K, N)."""
         tiles, k, n = self.tiles, self.k, self.tiles.count
-        normal = np.empty((len(tiles), 4 * k, 4 * k), np.float32)
-        right = np.empty((len(tiles), 4 * k, n), np.float32)
+        normal = np.zeros((len(tiles), 4 * k, 4 * k), np.float32)
+        right = np.zeros((len(tiles), 4 * k, n), np.float32)
 
         def one(part):
             d, value, x = self.solve_textures(weights, part, ridge)
@@ -85,28 +88,17 @@ class Pass:
             right[part] = e @ x.transpose(0, 2, 1)
             return float(value)
 
-        value = sum(in_threads(one, tiles.chunks()))
+        value = sum(in_threads(one, self.covered))
         return value, *_assemble(tiles.grid, k, normal, right)
 
-    def textures(self, weights, ridge):
-        """(h, w, K, C) float32 difference textures for weights (rows, columns, N, K)."""
-        tiles = self.tiles
-        flat = weights.reshape(-1, tiles.count, self.k).astype(np.float32)
-        out = np.empty((len(tiles), self.k * tiles.channels, TEXELS), np.float32)
 
-        def one(part):
-            # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
-            # which filters and mip-maps read too, is met as well.
-            d, _, _ = self.solve_textures(flat, part, ridge, tiles.differences(part, whole=True))
-            out[part] = d.reshape(len(d), -1, TEXELS)
+def _solve_texels(a, b, k, ridge, held, nearest=None):
+    """d (t, K, C, 64) with (A + ridge) d = b at every texel, by Cholesky; textures in held keep their values.
 
-        in_threads(one, tiles.chunks())
-        image = tiles.grid.join(out)
-        return image.reshape(*image.shape[:2], self.k, tiles.channels)
-
-
-def _solve_texels(a, b, k, ridge, held):
-    """d (t, K, C, 64) with (A + ridge) d = b at every texel, by Cholesky; textures in held keep their values."""
+    With nearest every value is rounded before the next is solved for, which then makes up for it (Babai 1986).
+    """
+    nearest = nearest or (lambda i, values: values)
+    held = {i: nearest(i, value) for i, value in held.items()}
     d = np.empty_like(b)
     for i, value in held.items():
         d[:, i] = value
@@ -129,7 +121,7 @@ def _solve_texels(a, b, k, ridge, held):
         rest = y[i]
         for q in range(m + 1, len(free)):
             rest = rest - factor[free[q], i][:, None] * d[:, free[q]]
-        d[:, i] = rest * factor[i, i][:, None]
+        d[:, i] = nearest(i, rest * factor[i, i][:, None])
     return d
 
 

@@ -4,21 +4,67 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.compress.packed import quantise
+from facewright.compress.packed import code_scale, nearest_codes, quantise
 from facewright.compress.refine import Pass
 from facewright.compress.threads import in_threads
 from facewright.compress.tiles import TEXELS
 
+# Values of difference textures beyond this share at either end are clipped; so many texels tell where that is.
+TAIL = 1e-4
+SAMPLE = 1 << 18
+
 
 def store_solution(tiles, weights, k, ridge, *, held=(), exact=False, report):
-    """Quantised weights, the difference textures that suit them best (ridge: per texture), and these quantised."""
+    """Quantised weights, and the quantised difference textures that suit them best (ridge: per texture).
+
+    exact  every difference texture is as near to its values as the step allows, for they are those of textures
+    """
     weights = np.ascontiguousarray(weights.transpose(2, 0, 1, 3))  # (N, rows, columns, K)
     codes, step, zero = quantise_weights(weights)
     stored = ((codes.astype(np.float32) - zero[:, None, None]) * step[:, None, None]).astype(np.float32)
     seen = stored if tiles.emphasis is None else stored * tiles.emphasis[:, None, None]
-    d = Pass(tiles, k, held).textures(seen.transpose(1, 2, 0, 3), ridge * tiles.count)
-    parts = quantise_textures(tiles, d, held=range(k) if exact else range(len(held)))
+    seen = np.ascontiguousarray(seen.transpose(1, 2, 0, 3)).reshape(-1, tiles.count, k)
+    parts = _stored_textures(tiles, Pass(tiles, k, held), seen, ridge * tiles.count, exact)
     return stored_parts(parts, (codes, step, zero), report)
+
+
+def _stored_textures(tiles, work, weights, ridge, exact):
+    """Codes (K, h, w, C), step and zero of the difference textures for weights (cells, N, K)."""
+    k, held = work.k, range(work.k) if exact else range(len(work.fixed))
+
+    def solved(part, nearest=None):
+        # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
+        # which filters and mip-maps read too, is met as well.
+        return work.solve_textures(weights, part, ridge, tiles.differences(part, whole=True), nearest)[0]
+
+    def sample(part):
+        return solved(part).transpose(0, 3, 1, 2)[tiles.scale[part, 0] > 0]  # (texels, K, C)
+
+    every = 1 if len(held) else max(1, len(tiles) * TEXELS // SAMPLE)
+    step, zero = _texture_scale(tiles, in_threads(sample, tiles.covered_chunks(every)), held)
+    fine_step, fine_zero = (x.astype(np.float32)[:, :, None] for x in (step, zero))
+    levels = tiles.levels[:, None]
+    codes = np.empty((len(tiles), k, tiles.channels, TEXELS), tiles.data.dtype)
+
+    def nearest(i, values):
+        return (nearest_codes(values, fine_step[i], fine_zero[i], levels) - fine_zero[i]) * fine_step[i]
+
+    def one(part):
+        codes[part] = nearest_codes(solved(part, None if exact else nearest), fine_step, fine_zero, levels)
+
+    in_threads(one, tiles.chunks())
+    image = tiles.grid.join(codes.reshape(len(tiles), -1, TEXELS))
+    image = image.reshape(*image.shape[:2], k, tiles.channels)
+    return np.ascontiguousarray(image.transpose(2, 0, 1, 3)), step, zero
+
+
+def _texture_scale(tiles, samples, held=()):
+    """Step and zero (K, C) from samples (texels, K, C): of held textures the whole range, of others all but TAIL."""
+    samples = np.concatenate(samples)
+    low, high = np.quantile(samples, TAIL, axis=0), np.quantile(samples, 1 - TAIL, axis=0)
+    for i in held:
+        low[i], high[i] = samples[:, i].min(axis=0), samples[:, i].max(axis=0)
+    return code_scale(low, high, tiles.levels)
 
 
 def stored_parts(textures, weights, report):
@@ -33,23 +79,16 @@ def quantise_weights(weights):
     return codes, step[:, 0, 0], zero[:, 0, 0]
 
 
-def quantise_textures(tiles, d, held=()):
-    """Codes (K, h, w, C) of D (h, w, K, C); all but held textures at the 99.99 percentile range of covered texels."""
-    height, width, k, channels = d.shape
+def quantise_textures(tiles, d):
+    """Codes (K, h, w, C), step and zero of difference textures (h, w, K, C)."""
+    height, width = d.shape[:2]
     covered = tiles.grid.join(tiles.scale)[:, :, 0] > 0
-    # A few hundred thousand texels tell the percentiles.
     every = (slice(None, None, max(1, height // 512)), slice(None, None, max(1, width // 512)))
-    sample = d[every][covered[every]]
-    sample = sample if len(sample) else np.zeros((1, k, channels), np.float32)
-    low, high = np.quantile(sample, 0.0001, axis=0), np.quantile(sample, 0.9999, axis=0)
-    for i in held:
-        low[i], high[i] = d[covered, i].min(axis=0), d[covered, i].max(axis=0)
-    parts = in_threads(
-        lambda i: quantise(d[:, :, i], low[i], high[i], tiles.levels, tiles.data.dtype),
-        range(k),
+    step, zero = _texture_scale(tiles, [d[every][covered[every]]])
+    codes = in_threads(
+        lambda i: nearest_codes(d[:, :, i], step[i], zero[i], tiles.levels).astype(tiles.data.dtype), range(d.shape[2])
     )
-    codes, steps, zeros = (np.stack([part[j] for part in parts]) for j in range(3))
-    return codes, steps, zeros
+    return np.stack(codes), step, zero
 
 
 def _predicted(tiles, part, textures, weights, work):

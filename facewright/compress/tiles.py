@@ -185,6 +185,12 @@ class TextureTiles:
         size = max(8, size * 20 // max(self.count, 20))
         return [slice(start, min(start + size, len(self))) for start in range(0, len(self), size)]
 
+    def covered_chunks(self, every=1):
+        """Indices, chunk by chunk, of the tiles that hold a covered texel, or of every so many of them."""
+        tiles = np.flatnonzero(self.scale.any(axis=(1, 2)))[::every]
+        size = self.chunks()[0].stop
+        return [tiles[start : start + size] for start in range(0, len(tiles), size)]
+
     def differences(self, part, whole=False):
         """(tiles, N, C * 64) float32 in 0-255, times emphasis, scale and gain; whole: uncovered texels too, without
         scale and gain."""
