@@ -13,12 +13,8 @@ import numpy as np
 from facewright.compress.masks import covered_texels
 from facewright.compress.packed import Packed, textures_within
 from facewright.compress.published import best_published
-from facewright.compress.refine import RIDGE, gram_matrix, pca_weights, refine
-from facewright.compress.store import (
-    measure_tiles,
-    root_mean,
-    store_solution,
-)
+from facewright.compress.refine import PASSES, RIDGE, gram_matrix, pca_weights, refine, settle
+from facewright.compress.store import SETTLING_TAIL, measure_tiles, root_mean, store_solution, texture_rounding
 from facewright.compress.tiles import TextureTiles, scratch_file
 from facewright.errors import InputError
 
@@ -43,7 +39,7 @@ class FacezipOptions:
     method      "refined", "paper" for the published one, or "pca" (constant weights, for comparison)
     textures    number of difference textures, 1 to 8 (paper: 2 to 5); with a budget the most that it may choose
     masks       number of masks of the published method
-    iterations  passes of the refinement; on 20 unrelated faces 15 leave 3.06, 25 3.00, 40 2.94
+    iterations  passes of the refinement; None: 15, and more for small sets, as long as they pay
     seed        of the samples and searches
     permute     False leaves the published permutation out (for comparison)
     budget      bytes in memory, uncompressed: the number of difference textures that fits (and, of the published
@@ -54,7 +50,7 @@ class FacezipOptions:
     method: str = "refined"
     textures: int = 4
     masks: int = 53
-    iterations: int = 15
+    iterations: int | None = None
     seed: int = 0
     permute: bool = True
     budget: int | None = None
@@ -291,7 +287,7 @@ def _encode(tiles, k, options, mesh, region, held, plain, progress):
         return result, measure_tiles(tiles, result)
     exact = _exact_basis(tiles, gram, k, held)
     if exact is not None:
-        result = store_solution(tiles, exact, exact.shape[3], LEAST_RIDGE, exact=True, report={"solution": "exact"})
+        result = store_solution(tiles, exact, LEAST_RIDGE, exact=True, report={"solution": "exact"})
         return result, measure_tiles(tiles, result)
     start = pca_weights(gram, k)
     if held:
@@ -299,20 +295,27 @@ def _encode(tiles, k, options, mesh, region, held, plain, progress):
         start[:, : len(held)] = 0
         start[list(held), range(len(held))] = 1
     ridge = ridge_for(gram, k)
-    result, errors = _refined(tiles, start, ridge, options, partial(progress, "refining"), held)
+    share = partial(progress, "refining")
+    result, errors = _refined(tiles, start, ridge, options.iterations, share, float(gram.trace()), held)
     if plain and not held:
         return _no_worse_than_pca(tiles, gram, ridge, options, progress, result, errors)
     return result, errors
 
 
-def _refined(tiles, start, ridge, options, share, held=()):
+def _refined(tiles, start, ridge, passes, share, energy=0.0, held=()):
     """The refined solution as stored, and its errors; textures count as tiles.emphasis says."""
     emphasis = np.float32(1) if tiles.emphasis is None else tiles.emphasis
-    weights, _ = refine(tiles, start * emphasis, iterations=options.iterations, ridge=ridge, keep=held, progress=share)
+    weights, values = refine(
+        tiles, start * emphasis, energy=energy, iterations=passes, ridge=ridge, keep=held, progress=share
+    )
+    if values:
+        whole = range(len(held))
+        rounding = texture_rounding(tiles, weights, ridge, held, whole, SETTLING_TAIL)
+        weights = settle(tiles, weights, rounding.of_part, ridge=ridge, keep=held)
     weights /= emphasis
     # Few textures leave little noise to damp: a smaller ridge in the end then costs no range.
     last = min(ridge, 1e-4) if tiles.count <= 4 else ridge
-    result = store_solution(tiles, weights, start.shape[1], last, held=held, report={"solution": "refined"})
+    result = store_solution(tiles, weights, last, held=held, report={"solution": "refined", "passes": len(values)})
     return result, measure_tiles(tiles, result)
 
 
@@ -336,6 +339,7 @@ def _no_worse_than_pca(tiles, gram, ridge, options, progress, result, errors):
     wanted = np.maximum(root_mean(constant_errors), 0.5 * tiles.unit)
     ratio, emphasis, start = rmse / wanted, np.ones(tiles.count), pca_weights(gram, k)
     worst = ratio.max()
+    passes = PASSES if options.iterations is None else options.iterations
     for turn in range(TURNS):
         if worst < 1:
             break
@@ -344,7 +348,7 @@ def _no_worse_than_pca(tiles, gram, ridge, options, progress, result, errors):
         # What is held almost exactly shows the damping: where two turns are not enough there is less of it.
         damping = ridge if turn < 2 else 0.5 * ridge
         share = partial(progress, f"evening out {turn + 1}")
-        trial, trial_errors = _refined(tiles, start, damping, options, share)
+        trial, trial_errors = _refined(tiles, start, damping, passes, share)
         tiles.emphasis = None
         ratio = root_mean(trial_errors) / wanted
         if ratio.max() < worst and root_mean(trial_errors).mean() <= CLEAR_GAIN * root_mean(constant_errors).mean():
@@ -363,7 +367,7 @@ def ridge_for(gram, k):
 def _store_pca(tiles, gram, k):
     start = pca_weights(gram, k)
     constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
-    return store_solution(tiles, constant, k, LEAST_RIDGE, report={"solution": "pca"})
+    return store_solution(tiles, constant, LEAST_RIDGE, report={"solution": "pca"})
 
 
 def pca_rmse(tiles, gram, k):

@@ -9,12 +9,13 @@ from facewright.compress.refine import Pass
 from facewright.compress.threads import in_threads
 from facewright.compress.tiles import TEXELS
 
-# Values of difference textures beyond this share at either end are clipped; so many texels tell where that is.
-TAIL = 1e-4
+# Values of difference textures beyond this share at either end are clipped, of more while weights settle (2.913 against
+# 2.920 on the faces); so many texels tell where that is.
+TAIL, SETTLING_TAIL = 1e-4, 3e-4
 SAMPLE = 1 << 18
 
 
-def store_solution(tiles, weights, k, ridge, *, held=(), exact=False, report):
+def store_solution(tiles, weights, ridge, *, held=(), exact=False, report):
     """Quantised weights, and the quantised difference textures that suit them best (ridge: per texture).
 
     exact  every difference texture is as near to its values as the step allows, for they are those of textures
@@ -23,46 +24,76 @@ def store_solution(tiles, weights, k, ridge, *, held=(), exact=False, report):
     codes, step, zero = quantise_weights(weights)
     stored = ((codes.astype(np.float32) - zero[:, None, None]) * step[:, None, None]).astype(np.float32)
     seen = stored if tiles.emphasis is None else stored * tiles.emphasis[:, None, None]
-    seen = np.ascontiguousarray(seen.transpose(1, 2, 0, 3)).reshape(-1, tiles.count, k)
-    parts = _stored_textures(tiles, Pass(tiles, k, held), seen, ridge * tiles.count, exact)
+    parts = _stored_textures(tiles, seen.transpose(1, 2, 0, 3), ridge, held, exact)
     return stored_parts(parts, (codes, step, zero), report)
 
 
-def _stored_textures(tiles, work, weights, ridge, exact):
-    """Codes (K, h, w, C), step and zero of the difference textures for weights (cells, N, K)."""
-    k, held = work.k, range(work.k) if exact else range(len(work.fixed))
+class Rounding:
+    """What difference textures can be stored as: codes with a step and a zero (K, C) each."""
 
-    def solved(part, nearest=None):
-        # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
-        # which filters and mip-maps read too, is met as well.
-        return work.solve_textures(weights, part, ridge, tiles.differences(part, whole=True), nearest)[0]
+    def __init__(self, tiles, step, zero):
+        self.tiles, self.step, self.zero = tiles, step, zero
+        self._step, self._zero = (x.astype(np.float32)[:, :, None] for x in (step, zero))
+        self._levels = tiles.levels[:, None]
 
-    def sample(part):
-        return solved(part).transpose(0, 3, 1, 2)[tiles.scale[part, 0] > 0]  # (texels, K, C)
+    def codes(self, values):
+        """Codes (..., K, C, 64) of values like them in 0-255 units."""
+        return nearest_codes(values, self._step, self._zero, self._levels)
 
-    every = 1 if len(held) else max(1, len(tiles) * TEXELS // SAMPLE)
-    step, zero = _texture_scale(tiles, in_threads(sample, tiles.covered_chunks(every)), held)
-    fine_step, fine_zero = (x.astype(np.float32)[:, :, None] for x in (step, zero))
-    levels = tiles.levels[:, None]
-    codes = np.empty((len(tiles), k, tiles.channels, TEXELS), tiles.data.dtype)
+    def nearest(self, i, values):
+        """The values (..., C, 64) nearest to those of texture i."""
+        return (nearest_codes(values, self._step[i], self._zero[i], self._levels) - self._zero[i]) * self._step[i]
 
-    def nearest(i, values):
-        return (nearest_codes(values, fine_step[i], fine_zero[i], levels) - fine_zero[i]) * fine_step[i]
+    def of_part(self, part):
+        """nearest() for tiles whose values are scaled as their differences are."""
+        scale = self.tiles.scale[part] * self.tiles.gain
+        inverse = np.divide(1, scale, out=np.zeros_like(scale), where=scale > 0)
+        return lambda i, values: self.nearest(i, values * inverse) * scale
+
+
+def texture_rounding(tiles, weights, ridge, held=(), whole=(), tail=TAIL):
+    """Rounding that suits the difference textures for weights (rows, columns, N, K).
+
+    held   textures that the first ones hold; whole: indices of difference textures of which nothing is clipped
+    tail   share of the others' values beyond either end, which are clipped
+    """
+    k = weights.shape[-1]
+    work, flat = Pass(tiles, k, held), np.ascontiguousarray(weights, np.float32).reshape(-1, tiles.count, k)
 
     def one(part):
-        codes[part] = nearest_codes(solved(part, None if exact else nearest), fine_step, fine_zero, levels)
+        d, _, _ = work.solve_textures(flat, part, ridge * tiles.count, tiles.differences(part, whole=True))
+        return d.transpose(0, 3, 1, 2)[tiles.scale[part, 0] > 0]  # (texels, K, C)
+
+    every = 1 if len(whole) else max(1, len(tiles) * TEXELS // SAMPLE)
+    samples = np.concatenate(in_threads(one, tiles.covered_chunks(every)))
+    return Rounding(tiles, *_texture_scale(tiles, samples, tail, whole))
+
+
+def _stored_textures(tiles, weights, ridge, held, exact):
+    """Codes (K, h, w, C), step and zero of the difference textures for weights (rows, columns, N, K)."""
+    k = weights.shape[-1]
+    whole = range(k) if exact else range(len(held))
+    rounding = texture_rounding(tiles, weights, ridge, held, whole)
+    nearest = None if exact else rounding.nearest
+    work, flat = Pass(tiles, k, held), np.ascontiguousarray(weights, np.float32).reshape(-1, tiles.count, k)
+    codes = np.empty((len(tiles), k, tiles.channels, TEXELS), tiles.data.dtype)
+
+    def one(part):
+        # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
+        # which filters and mip-maps read too, is met as well.
+        x = tiles.differences(part, whole=True)
+        codes[part] = rounding.codes(work.solve_textures(flat, part, ridge * tiles.count, x, nearest)[0])
 
     in_threads(one, tiles.chunks())
     image = tiles.grid.join(codes.reshape(len(tiles), -1, TEXELS))
     image = image.reshape(*image.shape[:2], k, tiles.channels)
-    return np.ascontiguousarray(image.transpose(2, 0, 1, 3)), step, zero
+    return np.ascontiguousarray(image.transpose(2, 0, 1, 3)), rounding.step, rounding.zero
 
 
-def _texture_scale(tiles, samples, held=()):
-    """Step and zero (K, C) from samples (texels, K, C): of held textures the whole range, of others all but TAIL."""
-    samples = np.concatenate(samples)
-    low, high = np.quantile(samples, TAIL, axis=0), np.quantile(samples, 1 - TAIL, axis=0)
-    for i in held:
+def _texture_scale(tiles, samples, tail=TAIL, whole=()):
+    """Step and zero (K, C) from samples (texels, K, C)."""
+    low, high = np.quantile(samples, tail, axis=0), np.quantile(samples, 1 - tail, axis=0)
+    for i in whole:
         low[i], high[i] = samples[:, i].min(axis=0), samples[:, i].max(axis=0)
     return code_scale(low, high, tiles.levels)
 
@@ -84,7 +115,7 @@ def quantise_textures(tiles, d):
     height, width = d.shape[:2]
     covered = tiles.grid.join(tiles.scale)[:, :, 0] > 0
     every = (slice(None, None, max(1, height // 512)), slice(None, None, max(1, width // 512)))
-    step, zero = _texture_scale(tiles, [d[every][covered[every]]])
+    step, zero = _texture_scale(tiles, d[every][covered[every]])
     codes = in_threads(
         lambda i: nearest_codes(d[:, :, i], step[i], zero[i], tiles.levels).astype(tiles.data.dtype), range(d.shape[2])
     )
