@@ -69,7 +69,9 @@ def run(options):
     neutral, mesh = read_texture(options.neutral), read_uv_mesh(options.mesh)
     region = None if options.region is None else read_mask(options.region, neutral.shape[:2]) > 0.5
     priority = None if options.priority is None else 1 + 9 * read_mask(options.priority, neutral.shape[:2])
-    examples = None if options.examples is None else read_examples(options.examples, names)
+    examples, strangers = None, []
+    if options.examples is not None:
+        *examples, strangers = read_examples(options.examples, names)
     shapes = None if examples is None else len(examples[0])
     chosen = FacezipOptions(options.method, options.textures, options.masks, budget=budget, shapes=shapes)
     reader = _Reader(sources, mesh, options.align)
@@ -95,7 +97,7 @@ def run(options):
             notes = [missing, *write_previews(results, folder, reader, names, examples)]
     print_summary(packed, about, reader, examples, results)
     print(f"files {written - started:.1f} s, preview {time.perf_counter() - written:.1f} s: {options.out}")
-    for note in filter(None, [*reader.notes(options.align), *notes]):
+    for note in filter(None, [*reader.notes(options.align), *notes, rows_left_out(options.examples, strangers)]):
         print(note)
 
 
@@ -138,7 +140,7 @@ def parse_size(text):
 
 def write_previews(packed, folder, reader, names, examples):
     """preview.html of the first map, preview_NAME.html of the others; returns sentences on what is left out."""
-    from facewright.compress.folder import cannot_write, preview_name
+    from facewright.compress.folder import preview_name, write_result
     from facewright.compress.preview import preview_missing, preview_page
 
     notes = []
@@ -149,11 +151,16 @@ def write_previews(packed, folder, reader, names, examples):
             notes.append(missing)
             continue
         page = preview_page(one, reader.of(name), len(names), title=f"FaceZip: {name}", examples=B)
-        try:
-            (folder / preview_name(number, name)).write_text(page, encoding="utf-8")
-        except OSError as error:
-            raise cannot_write(folder, error) from error
+        write_result(folder / preview_name(number, name), page.encode())
     return notes
+
+
+def rows_left_out(table, strangers):
+    """The sentence on rows of the table of shapes whose textures are not in the set, if any."""
+    if not strangers:
+        return ""
+    named = ", ".join(strangers[:6]) + (", ..." if len(strangers) > 6 else "")
+    return f"{table}: {counted(len(strangers), 'row')} left out, for there is no such texture: {named}"
 
 
 def counted(count, what):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,9 @@ from facewright.compress.evaluation import (
     run_method,
     search_curves,
 )
-from facewright.compress.folder import write_packed
+from facewright.compress.folder import png_size, write_result
 from facewright.compress.ktx2 import block_compressed, encoder_missing
 from facewright.errors import InputError
-from facewright.write.files import replace_file
 
 SHOWN = ("PCA(8)", "published", "refined")
 TABLES = ("table.csv", "expressions.csv", "masks.csv", "restarts.csv", "figures.json")
@@ -40,7 +38,7 @@ def compare(textures, progress=None):
         outcomes[name] = run_method(textures, name, options)
         progress("compressing", (step + 1) / len(METHODS))
     result = {"outcomes": outcomes, "bound": block_bound(textures), "raw_bytes": raw_bytes(textures)}
-    result["disk_bytes"] = {name: disk_bytes(outcome.packed) for name, outcome in outcomes.items()}
+    result["disk_bytes"] = {name: png_size(outcome.packed) for name, outcome in outcomes.items()}
     if not encoder_missing("bc7") and textures.neutral.dtype == np.uint8:
         refined = outcomes["refined"].packed
         result["bc7"] = {
@@ -58,12 +56,6 @@ def compare(textures, progress=None):
 def raw_bytes(textures):
     """Bytes of the neutral and all textures, uncompressed."""
     return int(textures.neutral.nbytes * (1 + len(textures.textures)))
-
-
-def disk_bytes(packed):
-    """Bytes of the PNG files of a Packed."""
-    with tempfile.TemporaryDirectory(prefix="facezip-") as folder:
-        return write_packed(packed, folder)["bytes"]["png"]
 
 
 def table_rows(result):
@@ -102,7 +94,7 @@ def write_comparison(result, textures, folder):
         _write_csv(folder / "masks.csv", names, result["masks"])
         sweeps = [[sweep, *costs] for sweep, costs in enumerate(search["history"].tolist())]
         _write_csv(folder / "restarts.csv", ["sweep", *range(search["history"].shape[1])], sweeps)
-    replace_file(folder / "figures.json", plain_figures(result).encode())
+    write_result(folder / "figures.json", plain_figures(result).encode())
     _write_plots(result, textures, folder)
 
 
@@ -123,7 +115,7 @@ def _write_csv(path, header, rows):
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(header)
     writer.writerows([f"{v:.6g}" if isinstance(v, float | np.floating) else v for v in row] for row in rows)
-    replace_file(path, stream.getvalue().encode())
+    write_result(path, stream.getvalue().encode())
 
 
 def _write_plots(result, textures, folder):
@@ -135,7 +127,7 @@ def _write_plots(result, textures, folder):
     def save(figure, name):
         stream = io.BytesIO()
         figure.savefig(stream, dpi=110)
-        replace_file(folder / name, stream.getvalue())
+        write_result(folder / name, stream.getvalue())
 
     outcomes = result["outcomes"]
     figure = Figure((max(7, 0.45 * len(textures.names) + 2), 4.2), layout="constrained")

@@ -105,7 +105,8 @@ def read_mask(path, shape):
 
 
 def read_examples(path, names):
-    """Shape names (M) and B (N, M) of a CSV: a header with the shapes, then a row for each texture, its name first."""
+    """Shape names (M) and B (N, M) of a CSV: a header with the shapes, then a row for each texture, its name first; and
+    the names of rows that belong to no texture."""
     try:
         rows = [row for row in csv.reader(Path(path).read_text(encoding="utf-8-sig").splitlines()) if any(row)]
         shapes = [name.strip() for name in rows[0][1:]]
@@ -121,4 +122,4 @@ def read_examples(path, names):
     B = np.array([weights[name] for name in names])
     if not np.isfinite(B).all():
         raise InputError(f"{path}: holds a weight that is no finite number")
-    return shapes, B
+    return shapes, B, [name for name in weights if name not in names]

@@ -126,7 +126,7 @@ class _Store:
         if self.ktx2 is None:
             return {"file": f"{name}.png"}
         data, on_card = raw_ktx2(pixels) if raw else texture_ktx2(pixels, self.ktx2)
-        self._write(f"{name}.ktx2", data)
+        write_result(self.folder / f"{name}.ktx2", data)
         self.bytes["ktx2"] += len(data)
         self.bytes["memory_ktx2"] += on_card
         self.done += 1
@@ -137,7 +137,7 @@ class _Store:
     def flush(self):
         """Write the PNG files, a few at a time."""
         for name, data in zip(self.waiting, in_threads(_png, self.waiting.values())):
-            self._write(name, data)
+            write_result(self.folder / name, data)
             self.bytes["png"] += len(data)
         self.waiting = {}
 
@@ -147,13 +147,7 @@ class _Store:
 
     def text(self, name, text):
         """Write a text file."""
-        self._write(name, text.encode())
-
-    def _write(self, name, data):
-        try:
-            (self.folder / name).write_bytes(data)
-        except OSError as error:
-            raise cannot_write(self.folder, error) from error
+        write_result(self.folder / name, text.encode())
 
 
 def _png(pixels):
@@ -164,10 +158,24 @@ def _png(pixels):
     return stream.getvalue()
 
 
-def cannot_write(folder, error):
-    """The InputError of a folder that takes no more."""
-    folder = folder.parent if folder.name.startswith(HIDDEN) else folder
-    return InputError(f"{folder}: cannot write ({error.strerror}); free space or choose another --out")
+def write_result(path, data):
+    """Write the bytes of a result; the InputError of a disk that takes no more names its place in the end."""
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path, error):
+    """The InputError of a file or folder that cannot be written, named without the hidden folder it waits in."""
+    shown = Path(*(part for part in Path(path).parts if not part.startswith(HIDDEN)))
+    return InputError(f"{shown}: cannot write ({error.strerror}); free space or choose another --out")
+
+
+def png_size(packed):
+    """Bytes of the PNG files of a Packed."""
+    atlas = [weight_atlas(packed, start) for start in range(0, len(packed.textures), 4)]
+    return sum(len(data) for data in in_threads(_png, [packed.neutral, *packed.textures, *atlas]))
 
 
 def choose_ktx2(kind):

@@ -210,6 +210,13 @@ def test_tables_that_say_too_little_are_refused(tmp_path, command, capsys, rows,
     assert words in told and len(told.splitlines()) == 1 and not (tmp_path / "packed").exists()
 
 
+def test_rows_of_other_textures_are_told(tmp_path, command, capsys):
+    rows = ["texture,a,b", *(f"{name},{n},2" for n, name in enumerate(NAMES)), "wink,3,4", "neutral,0,0"]
+    (tmp_path / "examples.csv").write_text("\n".join(rows))
+    assert run(command, tmp_path, "--examples", f"{tmp_path}/examples.csv", "--ktx2", "none") == 0
+    assert "2 rows left out, for there is no such texture: wink, neutral" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "weights,wanted",
     [
@@ -324,6 +331,24 @@ def test_a_full_disk_leaves_nothing(tmp_path, command, capsys, monkeypatch):
     assert run(command, tmp_path) == 2
     assert "No space left on device" in capsys.readouterr().err
     assert not (tmp_path / "packed").exists()
+
+
+def test_a_disk_that_fills_up_in_a_comparison_is_told_by_the_file(tmp_path, command, capsys, monkeypatch):
+    for name in NAMES[3:]:  # fewer than clusters: no published method, no search
+        (tmp_path / "textures" / f"{name}.png").unlink()
+    real = Path.write_bytes
+
+    def write_bytes(self, data):
+        if self.name == "worst.png":
+            raise OSError(28, "No space left on device")
+        return real(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+    out = tmp_path / "figures"
+    assert main(["evaluate", "compression", *command[1:], "--out", str(out), "--json"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"facewright: {out / 'worst.png'}: cannot write") and len(told.splitlines()) == 1
+    assert not out.exists()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
