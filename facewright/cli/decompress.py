@@ -53,6 +53,8 @@ def parse_weights(text):
         if weight is None:
             item += ","
         else:
+            if name.strip() in weights:
+                raise InputError(f"decompress: --weights names {name.strip()} twice; give every expression one weight")
             weights[name.strip()], item = weight, ""
     if item or not all(map(math.isfinite, weights.values())):
         raise InputError(

@@ -82,6 +82,8 @@ def read_uv_mesh(path):
     if not path.is_file():
         raise InputError(f"{path}: this mesh does not exist; give an OBJ file with UVs")
     mesh = read_obj(path)
+    if not len(mesh.faces):
+        raise InputError(f"{path.name}: holds no faces; give an OBJ mesh with UVs")
     if mesh.uv is None or mesh.uv_faces is None or (mesh.uv_faces < 0).any():
         raise InputError(f"{path.name}: faces without UVs; export the mesh with texture coordinates")
     bad = (mesh.faces < 0).any() or (mesh.faces >= len(mesh.vertices)).any() or (mesh.uv_faces >= len(mesh.uv)).any()

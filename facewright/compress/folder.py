@@ -253,7 +253,7 @@ def read_packed(folder, which=None):
         return _read_map(folder, about, maps[which or next(iter(maps))])
     except (OSError, ValueError, KeyError, TypeError, StopIteration, IndexError) as error:
         raise InputError(
-            f"{folder}: is no packed set ({error}); give a folder that `facewright compress` wrote"
+            f"{folder}: is no packed set ({str(error) or 'it holds no map'}); give a folder that `facewright compress` wrote"
         ) from None
 
 
@@ -276,6 +276,7 @@ def _read_map(folder, about, entry):
         and atlas.shape[:2] == (down * rows, across * columns)
         and steps.shape == zeros.shape == (k, neutral.shape[2])
         and weight_steps.shape == weight_zeros.shape == (count, k)
+        and all(np.isfinite(x).all() for x in (steps, zeros, weight_steps, weight_zeros))
         and layers.dtype.kind == "i"
         and layers.min() >= 0
         and layers.max() < count

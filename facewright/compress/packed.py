@@ -101,9 +101,12 @@ def facezip_decode(packed, weights):
 
     weights  dict name -> weight, or (N,) array in the order of packed.names
     returns  (h, w, C) like packed.neutral
-    raises   InputError for a name that is not in the set
+    raises   InputError for a name that is not in the set, or weights too large to add up
     """
-    image = decode_float(packed, weights)
+    with np.errstate(over="ignore", invalid="ignore"):
+        image = decode_float(packed, weights)
+    if not np.isfinite(image).all():
+        raise InputError("decompress: these weights are too large to blend; 0 to 1 is usual")
     return np.rint(np.clip(image, 0, 255) / packed.unit).astype(packed.neutral.dtype)
 
 

@@ -237,6 +237,26 @@ def test_weights_that_are_none(weights):
         parse_weights(weights)
 
 
+def test_weights_that_name_an_expression_twice():
+    with pytest.raises(InputError, match="names smile twice"):
+        parse_weights("smile=1,jaw=0.2, smile=0.5")
+
+
+def test_weights_too_large_to_blend_and_steps_that_are_none(tmp_path, command, capsys):
+    assert run(command, tmp_path, "--ktx2", "none") == 0
+    frame = ["decompress", f"{tmp_path}/packed", "--out", f"{tmp_path}/frame.png", "--weights"]
+    assert main([*frame, "smile=1e300"]) == 2
+    assert "too large to blend" in capsys.readouterr().err
+    index = tmp_path / "packed" / "facezip.json"
+    about = json.loads(index.read_text())
+    about["maps"]["color"]["differences"][0]["step"] = [float("nan")] * 3
+    index.write_text(json.dumps(about))
+    assert main([*frame, "smile=1"]) == 2
+    told = capsys.readouterr().err
+    assert "do not fit each other" in told and len(told.splitlines()) == 1
+    assert not (tmp_path / "frame.png").exists()
+
+
 def test_decompress_writes_png_only(tmp_path, capsys):
     assert main(["decompress", str(tmp_path), "--weights", "a=1", "--out", f"{tmp_path}/frame.jpg"]) == 2
     assert "ends in .png" in capsys.readouterr().err
@@ -269,6 +289,10 @@ def no_uv(folder):
     (folder / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 
 
+def no_faces(folder):
+    (folder / "mesh.obj").write_text("")
+
+
 def no_textures(folder):
     for path in (folder / "textures").iterdir():
         path.unlink()
@@ -282,6 +306,7 @@ def no_textures(folder):
         (other_size, "export all textures alike"),
         (uv_outside, "beyond the image"),
         (no_uv, "without UVs"),
+        (no_faces, "holds no faces"),
         (no_textures, "holds no images"),
     ],
 )
