@@ -72,7 +72,7 @@ def generated_sets():
 
 def face_sets(name, textures, seed=0):
     """(name, TextureSet, inf): sets of 16 or more of the faces of a set, taken by chance; in two of them another face
-    is the neutral one."""
+    is the neutral one. All of them at half the height and width too."""
     rng = np.random.default_rng(seed)
     faces = [textures.neutral, *textures.textures]
     for count, neutral in ((16, 0), (16, 0), (17, 0), (18, 0), (19, 0), (16, 7), (20, 13)):
@@ -85,6 +85,14 @@ def face_sets(name, textures, seed=0):
             names=tuple(f"face{n}" for n in chosen),
         )
         yield f"{name}: {count} of them" + (f" against {neutral}" if neutral else ""), some, np.inf
+    small = [halved(face) for face in faces]
+    yield f"{name}: at half the size", TextureSet.of(small[0], small[1:], textures.names, textures.mesh), np.inf
+
+
+def halved(image):
+    """Means of 2 x 2 texels."""
+    h, w, channels = image.shape
+    return np.rint(image.reshape(h // 2, 2, w // 2, 2, channels).mean(axis=(1, 3))).astype(image.dtype)
 
 
 def quality(sets, verdict):
