@@ -252,8 +252,9 @@ def read_packed(folder, which=None):
             raise InputError(f"{folder}: holds no map {which!r}; there are {', '.join(maps)}")
         return _read_map(folder, about, maps[which or next(iter(maps))])
     except (OSError, ValueError, KeyError, TypeError, StopIteration, IndexError) as error:
+        why = str(error) or "it holds no map"
         raise InputError(
-            f"{folder}: is no packed set ({str(error) or 'it holds no map'}); give a folder that `facewright compress` wrote"
+            f"{folder}: is no packed set ({why}); give a folder that `facewright compress` wrote"
         ) from None
 
 
