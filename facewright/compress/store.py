@@ -92,7 +92,7 @@ def _stored_textures(tiles, weights, ridge, held, exact):
 
 def _texture_scale(tiles, samples, tail=TAIL, whole=()):
     """Step and zero (K, C) from samples (texels, K, C)."""
-    low, high = np.quantile(samples, tail, axis=0), np.quantile(samples, 1 - tail, axis=0)
+    low, high = np.quantile(samples[:: max(1, len(samples) // SAMPLE)], [tail, 1 - tail], axis=0)
     for i in whole:
         low[i], high[i] = samples[:, i].min(axis=0), samples[:, i].max(axis=0)
     return code_scale(low, high, tiles.levels)
