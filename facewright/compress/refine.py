@@ -28,7 +28,7 @@ SMOOTH = 3e-4
 RIDGE = 0.003
 # Passes: so many, and more where they are cheap: PLENTY over tiles times textures (0.7 seconds of two cores), MOST at
 # most, as long as one takes PAYS of the error's square.
-PASSES, MOST, PLENTY, PAYS = 15, 60, 9e5, 1e-3
+PASSES, MOST, PLENTY, PAYS = 15, 90, 9e5, 1e-3
 # Passes that know how the textures will be stored.
 SETTLING = 2
 
