@@ -45,7 +45,7 @@ class PartingOptions:
     opposed: float = 0.2
     shorter: float = 1 / 3
     least_act: float = 0.25
-    patience: int = 3
+    patience: int = 6
     sweeps: int = 6
 
 
