@@ -118,7 +118,10 @@ def _nearer_to_hair(colors, skin, hair):
     near = (around**2).sum(axis=1) <= np.quantile((around**2).sum(axis=1), 0.9)  # lips and brows apart
     spread = around[near].T @ around[near] / near.sum() + 0.03**2 * np.eye(3)
     whiten = np.linalg.inv(np.linalg.cholesky(spread)).T
-    here, beside = (logs[0] - middle) @ whiten, (np.median(logs[2].reshape(len(colors), -1, 3), axis=1) - middle) @ whiten
+    here, beside = (
+        (logs[0] - middle) @ whiten,
+        (np.median(logs[2].reshape(len(colors), -1, 3), axis=1) - middle) @ whiten,
+    )
     apart = (beside**2).sum(axis=1)
     along = (here * beside).sum(axis=1)
     return (apart > TOLD_APART**2) & (along > 0.5 * apart)

@@ -172,16 +172,16 @@ def _stand_up(scan, subject, to_search, options):
         for guess in search_faces(subject, looks, up=up):
             if guess.residual_mm > BELIEVED_MM:
                 doubtful.append((guess, looks))
-            elif (T := _confirmed(subject, looks, guess)) is not None:
-                return T, []
+            elif (sure := _confirmed(subject, looks, guess)) is not None:
+                return sure[0], []
     warnings = ["the face was hard to find; check the landmarks"]
     by_hand = _stand_by_hand(scan, options.landmarks)
     if by_hand is not None:
         return by_hand @ np.linalg.inv(to_search), warnings
     doubtful.sort(key=lambda entry: entry[0].residual_mm)
     for guess, looks in doubtful[:4]:
-        if (T := _confirmed(subject, looks, guess)) is not None:
-            return T, warnings
+        if (sure := _confirmed(subject, looks, guess)) is not None:
+            return sure[0], [] if sure[1] >= AGREED_WHOLLY else warnings
     raise InputError(
         f"{scan.name}: no face was found on it; check that it is a head, or give the corners of both eyes and of the "
         "mouth with --landmarks"
@@ -203,7 +203,9 @@ def _stand_by_hand(scan, overrides):
 
 
 def _confirmed(subject, looks, guess):
-    """The frame of a guess after a second look from five sides, or None where they do not agree on a face."""
+    """The frame (4, 4) of a guess after a second look from five sides, and how far these agree; None where they do not
+    agree on a face.
+    """
     landmarks, found = _look(subject, guess.T, [looks], QUICK_VIEWS, may_miss=1)
     if landmarks is None:
         return None
@@ -213,7 +215,7 @@ def _confirmed(subject, looks, guess):
         return None
     turn = guess.T[:3, :3] @ found.T[:3, :3].T
     cosine = (np.trace(turn) / np.cbrt(np.linalg.det(turn)) - 1) / 2
-    return found.T if cosine > np.cos(np.radians(35.0)) else None
+    return (found.T, agreement) if cosine > np.cos(np.radians(35.0)) else None
 
 
 def _look(subject, T, wardrobe, views, *, may_miss=None):
