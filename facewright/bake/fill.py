@@ -28,7 +28,7 @@ FEATHER_MM = 5.0
 SHOWN_SHARE = 0.5
 # Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
 # is hair.
-STAIN_MM, STAIN_STEPS, STAIN_SPREADS, STAIN_SHARE, STAIN_EDGE_MM = 25.0, 20.0, 3.0, 0.5, 3.0
+STAIN_MM, STAIN_STEPS, STAIN_SPREADS, STAIN_SHARE = 25.0, 20.0, 3.0, 0.5
 # So is what is nearer to the hair's own colour than to the skin's, where the two differ by so many spreads of the skin.
 # On dark skin and in a strong light brightness does not tell them apart.
 TOLD_APART, HAIR_NEARBY = 3.0, 8
@@ -103,8 +103,8 @@ def hair_stains(V, F, means, share, hidden, hair):
     while True:
         grown = hidden | (dilate(reached, F) & passable)
         if (grown == reached).all():
-            # A vertex at the edge of a stain is half hair, half skin.
-            return shown & near & (surface_distance(V, F, reached & odd, STAIN_EDGE_MM) < STAIN_EDGE_MM)
+            # Hair ends somewhere on the faces at the edge of a stain.
+            return shown & near & dilate(reached & odd, F)
         reached = grown
 
 
