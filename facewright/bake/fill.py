@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import dilate, unique_edges
 from facewright.solve.quadratic import Factorization
@@ -28,6 +29,9 @@ SHOWN_SHARE = 0.5
 # Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
 # is hair.
 STAIN_MM, STAIN_STEPS, STAIN_SPREADS, STAIN_SHARE = 25.0, 20.0, 3.0, 0.5
+# So is what is nearer to the hair's own colour than to the skin's, where the two differ by so many spreads of the skin.
+# On dark skin and in a strong light brightness does not tell them apart.
+TOLD_APART, HAIR_NEARBY = 3.0, 8
 RIDGE = 1e-6
 FORGET_MM = 30.0
 LUMA = np.array([0.299, 0.587, 0.114])
@@ -75,10 +79,11 @@ def feather(V, F, outer, share):
     return np.where(outer & ~holes, t * t * (3 - 2 * t), 0.0)
 
 
-def hair_stains(V, F, means, share, hidden):
+def hair_stains(V, F, means, share, hidden, hair):
     """(n,) bool: vertices whose colour is that of the hair beside them: strands, a hairline, what shows between curls.
 
     V (n, 3), F (m, 3) skin; means (n, 3) sRGB and share (n,) as in solve_fill; hidden (n,) bool: hair covers the skin
+    hair (h, 3) sRGB: what covers it, for each hidden vertex
     A stain hangs together with skin that is hidden or not shown, so brows and birthmarks stay.
     """
     shown = (share >= SHOWN_SHARE) & ~hidden
@@ -90,13 +95,36 @@ def hair_stains(V, F, means, share, hidden):
     usual = np.median(brightness[skin])
     spread = 1.4826 * np.median(np.abs(brightness[skin] - usual))
     limit = min(max(STAIN_STEPS, STAIN_SPREADS * spread), STAIN_SHARE * usual)
-    odd = shown & near & (np.abs(brightness - usual) > limit)
+    odd = shown & near
+    odd[odd] = (np.abs(brightness[odd] - usual) > limit) | _nearer_to_hair(
+        means[odd], means[skin], hair[cKDTree(V[hidden]).query(V[odd], min(HAIR_NEARBY, hidden.sum()))[1]]
+    )
     passable, reached = odd | (near & ~shown), hidden
     while True:
         grown = hidden | (dilate(reached, F) & passable)
         if (grown == reached).all():
-            return reached & odd
+            # Hair ends somewhere on the faces at the edge of a stain.
+            return shown & near & dilate(reached & odd, F)
         reached = grown
+
+
+def _nearer_to_hair(colors, skin, hair):
+    """(k,) bool of colours (k, 3) beside hair (k, h, 3), on a head with skin (s, 3), all sRGB; light counts less than
+    hue: distances are in spreads of the skin's own colours, which light has spread already.
+    """
+    logs = [np.log(np.maximum(values, 1.0)) for values in (colors, skin, hair)]
+    middle = np.median(logs[1], axis=0)
+    around = logs[1] - middle
+    near = (around**2).sum(axis=1) <= np.quantile((around**2).sum(axis=1), 0.9)  # lips and brows apart
+    spread = around[near].T @ around[near] / near.sum() + 0.03**2 * np.eye(3)
+    whiten = np.linalg.inv(np.linalg.cholesky(spread)).T
+    here, beside = (
+        (logs[0] - middle) @ whiten,
+        (np.median(logs[2].reshape(len(colors), -1, 3), axis=1) - middle) @ whiten,
+    )
+    apart = (beside**2).sum(axis=1)
+    along = (here * beside).sum(axis=1)
+    return (apart > TOLD_APART**2) & (along > 0.5 * apart)
 
 
 def solve_fill(V, F, regions, mirror, outer, means, share, default):

@@ -25,6 +25,7 @@ from facewright.bake.texels import (
     texel_densities,
     unit_rows,
 )
+from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.render import linear_to_srgb
 from facewright.mesh.tangents import corner_tangents, to_tangent_space
@@ -32,6 +33,7 @@ from facewright.mesh.tangents import corner_tangents, to_tangent_space
 SEEN, FILLED, INSIDE = 255, 128, 0
 HAIR_EDGE_MM = 6.0
 SPECK_MM = 6.0
+HAIR_TEXEL_MM = 2.0  # hair's colour is that of a lock, not of a strand
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
 
 
@@ -87,7 +89,8 @@ def bake(scan, face, options=None, jobs=1):
     means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, len(skin.V), jobs)
     n = len(skin.V)
     regions = {name: mask[:n] for name, mask in face.regions.items()}
-    share = np.where(hair_stains(skin.V, skin.F, means, share, skin.hair), 0.0, share)
+    stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin))
+    share = np.where(stains, 0.0, share)
     default = _default_skin(face.template)
     fill = solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, share, default)
 
@@ -127,6 +130,13 @@ def _skin_of(face):
     # Where hair begins its colour already lies on the skin.
     observed &= surface_distance(face.fit[:n], F, hair, HAIR_EDGE_MM) >= HAIR_EDGE_MM
     return _Skin(face.fit[:n], face.vertices[:n], F, template.uv, FT, outer_faces, outer, observed, hair)
+
+
+def _hair_colors(scan, skin):
+    """(h, 3) sRGB of the scan beside each vertex that hair hides; black without colours."""
+    looks = ScanLooks(scan, with_normals=False)
+    found = Surface(scan.vertices, scan.faces).closest(skin.V[skin.hair])
+    return looks.colors(found.faces, found.barycentric.astype(np.float32), np.full(len(found.faces), HAIR_TEXEL_MM))[0]
 
 
 def _without_specks(V, F, observed):

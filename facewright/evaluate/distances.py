@@ -1,6 +1,7 @@
 """How far a fitted template and its scan lie apart: the definitions of every distance in reports and benchmarks.
 
-scan_to_face: points sampled evenly by area on the scan whose nearest point on the template lies in a region.
+scan_to_face: points sampled evenly by area on the scan whose nearest point on the template lies in a region; shoulders
+below a chin and inner walls of a hollow scan, which are nearest to a face that the scan has elsewhere, are none of it.
 face_to_scan: points sampled evenly by area on that region of the template; one whose nearest scan point lies on a
 border of the scan is left out and counted, since there the scan has no surface. The template's surface is its skin with
 the inside of mouth, sockets and nostrils, and its eyeballs: a scan point on an eye or in a nostril is not called skin.
@@ -19,6 +20,8 @@ from facewright.mesh.normals import face_areas, vertex_normals
 from facewright.mesh.openness import vertex_openness
 
 HIDDEN = 0.03  # openness under which a scan's face lies in a pocket of its own
+# A scan point this far from the face is another thing than the face if the scan comes so much nearer to the same place.
+ELSEWHERE_MM, NEARER_SHARE = 10.0, 0.5
 PLASTIC = 0.7548776662466927  # with its square the least regular pair of steps on the unit square
 
 
@@ -131,9 +134,14 @@ def scan_to_face(scan, fit, faces, regions, *, subset=None, hidden=None, painted
         interpolate(vertex_normals(fit, faces), faces, nearest.faces, nearest.barycentric),
     )
     seen = np.ones(len(samples.faces), bool) if hidden is None else ~hidden[samples.faces]
+    far = np.flatnonzero(nearest.distance > ELSEWHERE_MM)
+    here = np.ones(len(samples.faces), bool)
+    if len(far):
+        there = Surface(vertices, scan_faces).closest(nearest.points[far]).distance
+        here[far] = there >= NEARER_SHARE * nearest.distance[far]
     result = {}
     for name, mask in regions.items():
-        inside = in_region(mask, faces, nearest.faces, nearest.barycentric)
+        inside = in_region(mask, faces, nearest.faces, nearest.barycentric) & here
         counted = inside & seen
         asked = len(inside) if painted else inside.sum()
         result[name] = summary(nearest.distance[counted], 1.0 - counted.sum() / max(asked, 1))

@@ -1,4 +1,4 @@
-"""Best rotation and best similarity between paired points."""
+"""Best rotation, similarity and affine map between paired points."""
 
 from __future__ import annotations
 
@@ -21,6 +21,20 @@ def best_similarity(source, target, weights=None, scale_limits=(0.0, np.inf)):
     R, scale, a, b = _procrustes(source, target, weights)
     scale = float(np.clip(scale, *scale_limits))
     return R, scale, b - scale * R @ a
+
+
+def best_affine(source, target, weights, like, hold):
+    """A (3, 3), t (3,) with the least weighted sum of |A source_i + t - target_i|^2, held to a matrix like (3, 3).
+
+    weights (n,); hold is the weight of |A - like|^2 as a share of the source's mean spread along an axis
+    """
+    weights = weights / weights.sum()
+    mean_source, mean_target = weights @ source, weights @ target
+    a, b = source - mean_source, target - mean_target
+    spread = (a * weights[:, None]).T @ a
+    held = hold * np.trace(spread) / 3 * np.eye(3)
+    A = np.linalg.solve(spread + held, ((b * weights[:, None]).T @ a + like @ held).T).T
+    return A, mean_target - A @ mean_source
 
 
 def _procrustes(source, target, weights):

@@ -93,8 +93,8 @@ def warnings(scan, face, registration, clean_stats, pose_info):
         )
     if registration["hidden_share"] > 0.01:
         notes.append(
-            f"{registration['hidden_share']:.0%} of the face lie under hair or cloth: there it follows "
-            "the model and is left out of the figures"
+            f"{registration['hidden_share']:.0%} of the face are hidden by hair or cloth, or missing: there "
+            "it follows the model and is left out of the figures"
         )
     if registration["folded"]:
         notes.append(f"{registration['folded']} faces of the fit are folded")

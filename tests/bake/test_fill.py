@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from facewright.bake.fill import FORGET_MM, feather, hair_stains, solve_fill, surface_distance
+from facewright.mesh.adjacency import dilate
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +79,24 @@ def test_a_lock_at_the_hairline_is_hair_and_a_brow_is_not(ball):
     lock = (np.abs(V[:, 0]) < 12) & (V[:, 1] > 25) & ~hidden
     brow = (np.abs(V[:, 0] - 30) < 12) & (np.abs(V[:, 1] - 20) < 6) & (V[:, 2] > 0)
     means = np.where((hidden | lock | brow)[:, None], 30.0, 150.0) * np.ones(3)
-    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden)
+    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, means[hidden])
     assert lock.any() and brow.any()
-    np.testing.assert_array_equal(stains, lock)
-    assert not hair_stains(V, F, means, np.ones(len(V)), np.zeros(len(V), bool)).any(), "no hair, no stains"
+    assert (stains & ~hidden)[lock].all() and not (stains & brow).any()
+    assert not (stains & ~dilate(lock, F)).any(), "and its edge, no more"
+    none = np.zeros(len(V), bool)
+    assert not hair_stains(V, F, means, np.ones(len(V)), none, means[none]).any(), "no hair, no stains"
+
+
+def test_hair_as_bright_as_the_shaded_skin_is_told_by_its_hue(ball):
+    V, F, _, _ = ball
+    hidden = V[:, 1] > 40
+    lock = (np.abs(V[:, 0]) < 12) & (V[:, 1] > 25) & ~hidden
+    light = (0.75 + 0.25 * V[:, :1] / 80.0) * np.ones(3)
+    skin, hair = light * [190.0, 140.0, 120.0], 0.9 * light * [140.0, 110.0, 50.0]
+    means = np.where((hidden | lock)[:, None], hair, skin)
+    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, hair[hidden])
+    assert stains[lock].mean() > 0.95
+    assert not (stains & ~dilate(lock, F)).any()
 
 
 def test_far_from_the_rim_the_fill_is_the_usual_skin(ball):

@@ -53,6 +53,20 @@ def test_parallel_planes_are_their_gap_apart_both_ways():
     assert there["left_out"] == 0.0
 
 
+def test_shoulders_are_no_face_but_a_fit_that_failed_is_far():
+    (near, faces), (far, _) = plane(z=0.5), plane(z=25.0)
+    fit, fit_faces = plane(n=9)
+    everything = {"face": np.ones(len(fit), bool)}
+    both = np.vstack([near, far]), np.vstack([faces, faces + len(near)])
+    figures = distances.scan_to_face(both, fit, fit_faces, everything)["face"]
+    assert figures["max"] == pytest.approx(0.5)
+    assert figures["left_out"] == 0.0
+    painted = distances.scan_to_face(both, fit, fit_faces, everything, painted=True)["face"]
+    assert painted["left_out"] == pytest.approx(0.5), "what was painted as face is asked"
+    alone = distances.scan_to_face((far, faces), fit, fit_faces, everything)["face"]
+    assert alone["mean"] == pytest.approx(25.0)
+
+
 def test_only_the_region_of_the_nearest_point_counts():
     scan, (fit, faces) = plane(z=0.5), plane()
     fit = fit.copy()

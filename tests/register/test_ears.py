@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from facewright.register.correspond import Target
-from facewright.register.ears import _without_ear, ear_motion
+from facewright.register.ears import EarOptions, _without_ear, ear_motion, hidden_ears
 
 
 @pytest.fixture(scope="module")
@@ -16,16 +16,21 @@ def head(hm08):
 
 
 def with_other_ears(V, ears, scale, shift):
-    """Vertices whose ears are scaled about their own centre and shifted outwards, the head around following."""
+    """Vertices whose ears are scaled about their own centre (by one factor or one an axis) and shifted outwards, the
+    head around following.
+    """
     moved = V.copy()
     for ear, sign in zip(ears, (1.0, -1.0)):
         center = V[ear].mean(axis=0)
         share = np.clip(1.0 - cKDTree(V[ear]).query(V)[0] / 15.0, 0.0, 1.0)[:, None]
-        moved += share * ((scale - 1.0) * (V - center) + np.array(shift) * [sign, 1.0, 1.0])
+        moved += share * ((np.array(scale) - 1.0) * (V - center) + np.array(shift) * [sign, 1.0, 1.0])
     return moved
 
 
-@pytest.mark.parametrize("scale, shift", [(1.3, (0.0, 3.0, -2.0)), (0.8, (0.0, -2.0, 0.0)), (1.0, (0.0, 7.0, -5.0))])
+@pytest.mark.parametrize(
+    "scale, shift",
+    [(1.3, (0.0, 3.0, -2.0)), (0.8, (0.0, -2.0, 0.0)), (1.0, (0.0, 7.0, -5.0)), (1.0, (0.0, -12.0, 8.0))],
+)
 def test_other_ears_are_found(head, scale, shift):
     V, F, ears = head
     scan = with_other_ears(V, ears, scale, shift)
@@ -33,6 +38,26 @@ def test_other_ears_are_found(head, scale, shift):
     for ear in ears:
         before, after = (np.linalg.norm((x - scan)[ear], axis=1).mean() for x in (V, moved))
         assert after < 0.4 * before
+
+
+def test_narrow_ears_of_a_child_are_found(head):
+    V, F, ears = head
+    scan = with_other_ears(V, ears, (1.0, 0.95, 0.7), (0.0, 4.0, 3.0))
+    target = Target(scan, F)
+    moved = V + ear_motion(V, F, ears, target)
+    scaled_only = V + ear_motion(V, F, ears, target, EarOptions(hold=1e6))
+    for ear in ears:
+        before, scaled, after = (np.linalg.norm((x - scan)[ear], axis=1).mean() for x in (V, scaled_only, moved))
+        assert after < 0.4 * before
+        assert after < 0.8 * scaled
+    assert not hidden_ears(moved, F, ears, target).any()
+
+
+def test_what_shows_no_ear_hides_it(head):
+    V, F, (left, right) = head
+    bare = _without_ear(V, F, np.flatnonzero(left)).vertices
+    hidden = hidden_ears(V, F, (left, right), Target(bare, F))
+    np.testing.assert_array_equal(hidden, left)
 
 
 def test_ears_that_fit_and_ears_that_are_hidden_stay(head):

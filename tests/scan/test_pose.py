@@ -107,6 +107,15 @@ def test_landmarks_by_hand_win(sample, found):
     assert by_hand.landmarks.weights[index] == 1.0
 
 
+def test_a_strange_face_that_all_looks_agree_on(found):
+    """Narrow and deep, 6.7 mm off the canonical face: eyes 46 mm apart."""
+    stretched = found.scan.vertices * [0.75, 1.1, 1.35]
+    strange = find_landmarks(replace(found.scan, vertices=stretched, T_ours_to_scan=np.eye(4)))
+    assert strange.stats["residual_mm"] > 5.5 and not strange.warnings
+    wanted, got = (x.landmarks.positions(stretched, found.scan.faces)[list(STABLE)] for x in (found, strange))
+    assert np.linalg.norm(got - wanted, axis=1).mean() < 2.0
+
+
 def test_what_is_no_face(ball_scan):
     cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1.0)])
     quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])

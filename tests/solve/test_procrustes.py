@@ -1,8 +1,8 @@
-"""Best rotations and similarities recover what made the points."""
+"""Best rotations, similarities and affine maps recover what made the points."""
 
 import numpy as np
 
-from facewright.solve.procrustes import best_rotation, best_similarity
+from facewright.solve.procrustes import best_affine, best_rotation, best_similarity
 
 POINTS = np.random.default_rng(0).normal(size=(20, 3))
 
@@ -37,3 +37,12 @@ def test_the_scale_is_kept_within_its_limits():
     assert scale == 1.2
     moved = scale * POINTS @ R.T + t
     assert np.allclose(moved.mean(axis=0), (3 * POINTS + 1).mean(axis=0))
+
+
+def test_an_affine_map_is_recovered_and_held_to_another():
+    A, t, ones = np.random.default_rng(4).normal(size=(3, 3)), np.array([3.0, -4, 5]), np.ones(len(POINTS))
+    found = best_affine(POINTS, POINTS @ A.T + t, ones, np.eye(3), hold=0.0)
+    assert np.allclose(found[0], A) and np.allclose(found[1], t)
+    held, shift = best_affine(POINTS, POINTS @ A.T + t, ones, np.eye(3), hold=1e9)
+    assert np.allclose(held, np.eye(3), atol=1e-6)
+    assert np.allclose((POINTS + shift).mean(axis=0), (POINTS @ A.T + t).mean(axis=0))
