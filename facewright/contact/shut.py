@@ -61,9 +61,12 @@ class LipSlit:
     def gaps(self, skin):
         """(k,) of each line of a pose (n, 3): height in mm of the slit at its inner vertices, less than 0: covered."""
         x = skin[:, 0]
+        corners = x[self.seams[0][[0, -1]]]
         result = []
         for line, asked in zip(self.seams, self._asked):
             at, worst = x[line[1:-1]], np.full(len(line) - 2, -np.inf)
+            # Where a pose crowds a corner the lips run upright: their height there is no slit.
+            asked = asked & (np.abs(at[:, None] - corners).min(axis=1) > self.options.corner_mm)
             over = [_Crossings(at, x, edges) for edges in self._edges]
             for height in self._heights:
                 y = skin @ height

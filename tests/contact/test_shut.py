@@ -69,6 +69,17 @@ def test_next_to_a_corner_nothing_is_a_slit(slit):
         assert np.isfinite(gap[1:-1]).all()
 
 
+def test_lips_that_a_pose_crowds_into_a_corner_have_no_slit_there(slit):
+    V, lips, n = slit
+    crowded = V.copy()
+    near = V[:, 0] > 14.0
+    crowded[near, 0] = 19.5 + (V[near, 0] - 14.0) / 12.0
+    crowded[near & (np.arange(len(V)) >= n), 1] -= 1.0
+    for gap in lips.gaps(crowded):
+        assert np.isneginf(gap[V[1:40, 0] > 14.0]).all()
+    assert not lips.shut(crowded).any()
+
+
 def test_lips_that_cover_each_other_are_drawn_apart_but_for_what_is_meant(slit):
     V, lips, n = slit
     lapped = V.copy()
