@@ -307,7 +307,7 @@ class _Mouth:
         shut, twice = _stays_shut(pose)
         if shut:
             first = first + self.contact.shut(motion, weights, acts, lifted=twice)
-        return first + self.contact.apart(motion, weights, acts, closed, shut and not twice)
+        return first + self.contact.apart(motion, weights, acts, closed, shut)
 
     def _too_much(self, targets, pose):
         """(n, 3) what a pose does twice: the ring of muscle around the mouth draws together only once."""

@@ -27,7 +27,7 @@ class ShutOptions:
 
     overlap_mm: float = 0.05
     lap_mm: float = 0.1
-    touch_mm: float = 0.1
+    touch_mm: float = 0.05
     inside_mm: float = 0.5
     outside_mm: float = 9.0
     corner_mm: float = 1.0

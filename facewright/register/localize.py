@@ -46,8 +46,10 @@ class LocalizedBasis:
 
     def at(self, rows):
         """(j, k, 3) the modes at vertices rows (k,)."""
-        pieces = _pieces(self.basis, self.windows, rows)
-        return (self.mixture @ pieces.reshape(len(pieces), -1)).reshape(len(self), len(rows), 3)
+        # Single precision is off by 1e-5 mm, and takes half the time.
+        pieces = _pieces(self.basis[:, rows].astype(np.float32), self.windows[rows].astype(np.float32))
+        mixed = self.mixture.astype(np.float32) @ pieces.reshape(len(pieces), -1)
+        return mixed.reshape(len(self), len(rows), 3).astype(float)
 
     def along(self, alpha):
         """(n, 3) the displacement of the whole head by alpha (j,) standard deviations of each mode."""
@@ -70,7 +72,7 @@ def localized_basis(vertices, basis, face, outer, *, n_windows=WINDOWS, length_m
     rows = np.flatnonzero(face | outer)
     rows = rows[:: max(1, len(rows) // SAMPLES)]
     measure = np.sqrt(np.where(face[rows], 1.0, OUTSIDE_WEIGHT))[None, :, None]
-    pieces = _pieces(basis, windows, rows)
+    pieces = _pieces(basis[:, rows], windows[rows])
     scale = np.where(np.arange(len(pieces)) < len(basis), np.sqrt(1 - share), np.sqrt(share))
     flat = (scale[:, None, None] * pieces * measure).reshape(len(pieces), -1)
     values, vectors = np.linalg.eigh(flat @ flat.T)
@@ -78,11 +80,10 @@ def localized_basis(vertices, basis, face, outer, *, n_windows=WINDOWS, length_m
     return LocalizedBasis(basis, windows, vectors * scale)
 
 
-def _pieces(basis, windows, rows):
-    """(i + w r, k, 3) at vertices rows (k,): the modes (i, n, 3), then the first w of them through windows (n, r)."""
-    wide = basis[:WIDE_MODES, rows]
-    local = wide[:, None] * windows[rows].T[None, :, :, None]  # (w, r, k, 3)
-    return np.concatenate([basis[:, rows], local.reshape(-1, len(rows), 3)])
+def _pieces(basis, windows):
+    """(i + w r, k, 3): the modes (i, k, 3), then the first w of them through windows (k, r)."""
+    local = basis[:WIDE_MODES, None] * windows.T[None, :, :, None]  # (w, r, k, 3)
+    return np.concatenate([basis, local.reshape(-1, *basis.shape[1:])])
 
 
 def _windows(vertices, outer, count, length_mm):

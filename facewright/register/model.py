@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from scipy.spatial.transform import Rotation
 
 from facewright.mesh.laplacian import lumped_mass
@@ -200,14 +201,15 @@ class _State:
         p = n_identity + n_expression + 7
         A, b = np.zeros((p, p)), np.zeros(p)
         for rows, residuals, weights in terms:
-            weighted = rows * weights[:, None]
-            A += weighted.T @ rows
-            b -= weighted.T @ residuals
+            root = np.sqrt(weights)
+            weighted = rows * root[:, None]
+            A += weighted.T @ weighted  # of a matrix with itself: half of the work
+            b -= weighted.T @ (root * residuals)
         prior = np.concatenate([np.ones(n_identity), self.std**-2, np.full(7, 1e-6)])
         value = np.concatenate([self.alpha, self.expression - self.expected, np.zeros(7)])
         A[np.diag_indices(p)] += prior
         b -= prior * value
-        step = np.linalg.solve(A, b)
+        step = scipy.linalg.solve(A, b, assume_a="pos", overwrite_a=True, check_finite=False)
         self.alpha = np.clip(self.alpha + step[:n_identity], -4, 4)
         self.expression = np.clip(self.expression + step[n_identity : n_identity + n_expression], -0.3, 1.1)
         turn = Rotation.from_rotvec(step[-7:-4]).as_matrix()
