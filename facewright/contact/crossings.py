@@ -46,7 +46,8 @@ class _Crossings:
         self.rest, self.teeth = face.vertices, rows_of_teeth(template, face.vertices)
         self.V, faces = face.vertices[self.at], template.faces[template.skin.face_slice]
         asked = face.regions["face"][self.at][faces].all(axis=1)
-        farthest = np.where(face.regions["outer"][self.at], _SEEN_MM, _HIDDEN_MM)
+        self.outer = face.regions["outer"][self.at]
+        farthest = np.where(self.outer, _SEEN_MM, _HIDDEN_MM)
         near = np.zeros(len(self.V), bool)
         for name, line in face.lines.items():
             kind = name.rsplit("_", 1)[0] if name.startswith(("lip_seam", "nostril")) else name.split("_")[0]
@@ -68,7 +69,9 @@ class _Crossings:
         heads = [self.rest + motion for motion in motions]
         far = max(np.abs(motion[self.at]).max(initial=0.0) for motion in motions) > _FAR_MM
         ways_out = [partial(out_of_teeth, self.teeth, head) for head in heads]
-        return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out)
+        # Outer skin that a shape leaves alone lies outside its region.
+        still = self.outer & ~np.any([motion[self.at].any(axis=1) for motion in motions], axis=0)
+        return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out, still)
 
     def with_shapes(self, targets, run):
         """Targets whose shapes have no crossings, nor the halves of those that have any."""

@@ -67,12 +67,14 @@ class Parting:
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
         self._beyond = -np.asarray(igl.fast_winding_number(self.rest, self.faces, outside)).reshape(-1)
 
-    def __call__(self, poses, acts, ways_out):
+    def __call__(self, poses, acts, ways_out, still=None):
         """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
 
         poses  sequence of (n, 3); acts: how strongly the correction acts in each, a number or (n, 1)
         ways_out  for each a function of points (k, 3): their ways (k, 3) out of what skin must not enter
+        still  (n,) bool: vertices that stay where they are
         """
+        farthest = self._farthest if still is None else np.where(still[self.used, None], 0.0, self._farthest)
         field = np.zeros_like(self.rest)
         asked = zip(poses, acts, ways_out)
         poses = [_Pose(pose[self.used], self._cut(act), way_out) for pose, act, way_out in asked]
@@ -86,14 +88,9 @@ class Parting:
             if faults < fewest:
                 best, fewest, waited = field, faults, 0
             for pose in poses:
-                field = self._within(field + self._apart(pose, field))
-                field = self._within(field + self._flat(pose, field))
-                field = self._within(field + self._out(pose, field))
+                for correction in (self._apart, self._flat, self._out):
+                    field = _within(field + correction(pose, field), farthest)
         return self._of_skin(best)
-
-    def _within(self, field):
-        length = lengths(field)[:, None]
-        return field * np.minimum(1.0, self._farthest / np.maximum(length, 1e-12))
 
     def _of_skin(self, field):
         result = np.zeros((self._n, 3))
@@ -220,6 +217,11 @@ class Parting:
             np.add.at(count, corners, share)
             now = now + total / np.maximum(count, 1.0)[:, None]
         return (now - start) / np.maximum(pose.act, self.options.least_act)
+
+
+def _within(field, farthest):
+    """A field (k, 3) no longer anywhere than farthest (k, 1)."""
+    return field * np.minimum(1.0, farthest / np.maximum(lengths(field)[:, None], 1e-12))
 
 
 class _Pose:
