@@ -144,7 +144,17 @@ class Lids:
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
             pose = pose + self.field(*slides)[:, None] * self.axis
-        return self.lifted(self.rotated(pose, turns), ball, passing_mm)
+        return self.firm(self.lifted(self.rotated(pose, turns), ball, passing_mm))
+
+    def firm(self, pose):
+        """The pose (n, 3) with the rims as the margins carry them: turned with them, and else as at rest."""
+        rims = self._rims.carried
+        feet = rims.feet(pose)
+        turn = self.angles(feet) - self.angles(rims.feet(self.V))
+        carried = feet + self._about_axis(rims.offset, turn)
+        result = pose.copy()
+        result[rims.index] += rims.weight[:, None] * (carried - pose[rims.index])
+        return result
 
     def field(self, upper, lower):
         """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
@@ -184,11 +194,14 @@ class Lids:
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
-        offset = pose - self.ball.center
-        c, s = np.cos(field)[:, None], np.sin(field)[:, None]
+        return self.ball.center + self._about_axis(pose - self.ball.center, field)
+
+    def _about_axis(self, vectors, turns):
+        """Vectors (k, 3) turned by (k,) radians about the axis."""
+        c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
         axis = -self.axis
-        along = (offset @ axis)[:, None] * axis
-        return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
+        along = (vectors @ axis)[:, None] * axis
+        return along + c * (vectors - along) + s * np.cross(axis, vectors)
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
         """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
@@ -228,7 +241,7 @@ class Lids:
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self._met(self.lifted(pose + np.stack(spread, axis=1), ball))
+        return self._met(self.firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
 
     def _met(self, pose):
         """The pose (n, 3) of closed lids whose rims lie on each other."""

@@ -13,6 +13,7 @@ _ENDS_MM = 2.0  # from a canthus: there it sets in
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
 _NO_AREA = 1e-12
+_FIRM_MM, _SOFT_MM = 1.2, 3.5  # from the margin: so far a lid keeps its form whole, and not at all
 
 
 class LidRims:
@@ -26,6 +27,7 @@ class LidRims:
         margins = np.zeros(len(vertices), bool)
         margins[upper] = margins[lower] = True
         self.sides = [np.flatnonzero(side & ~margins) for side in sides]
+        self.carried = CarriedRims(vertices, [side & ~margins for side in sides], (upper, lower))
         self.patches = []
         for side, line in zip(sides, (upper, lower)):
             mine = side.copy()
@@ -53,6 +55,39 @@ class LidRims:
             for mine, turn in zip(self.sides, turns):
                 turned[mine] += turn
         return turned - angle
+
+
+class CarriedRims:
+    """The rims of both lids, which margins carry as they are: a rim is firm (the tarsus), skin beyond gives way.
+
+    vertices (n, 3) mm at rest, sides: masks (n,) of the outer skin of the upper and the lower lid; margins: the two
+    lines of vertices from canthus to canthus
+    """
+
+    def __init__(self, vertices, sides, margins):
+        found = [_carried(vertices, np.flatnonzero(side), line) for side, line in zip(sides, margins)]
+        self.index, self.before, self.after, self.share, self.weight = (np.concatenate(each) for each in zip(*found))
+        self.offset = vertices[self.index] - self.feet(vertices)
+
+    def feet(self, pose):
+        """(k, 3) where on its margin each rim vertex hangs, in a pose (n, 3)."""
+        share = self.share[:, None]
+        return (1.0 - share) * pose[self.before] + share * pose[self.after]
+
+
+def _carried(vertices, side, line):
+    """Vertices of one lid near its margin: their indices, the margin's vertices before and after, the share of the way
+    between those, and how firmly they hang there."""
+    start, edge = vertices[line[:-1]], np.diff(vertices[line], axis=0)
+    share = ((vertices[side][:, None] - start) * edge).sum(axis=2) / np.maximum((edge**2).sum(axis=1), 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(vertices[side][:, None] - start - share[:, :, None] * edge, axis=2)
+    nearest = away.argmin(axis=1)
+    k = np.arange(len(side))
+    weight = np.clip((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM), 0.0, 1.0)
+    hangs = weight > 0.0
+    weight = (weight * weight * (3.0 - 2.0 * weight))[hangs]
+    return side[hangs], line[:-1][nearest[hangs]], line[1:][nearest[hangs]], share[k, nearest][hangs], weight
 
 
 def _from_ends(chain):
