@@ -27,6 +27,7 @@ _SETTLINGS = 3
 _ENDS_MM = 4.0  # of the closing line, over which it rises to the canthi
 _FAR_MM = 2.0
 _WAVES = 2  # of the closing line between the canthi
+_RADIUS_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -236,7 +237,7 @@ class Lids:
             along, theta = pose[line] @ self.axis - ball.center @ self.axis + slide, self.angles(pose[line])
             spokes = np.cos(theta)[:, None] * self.forward + np.sin(theta)[:, None] * self.up
             points = pose[line]
-            for _ in range(2):  # the ball's radius is asked where the point comes to lie
+            for _ in range(_RADIUS_ROUNDS):  # the radius is asked where the point comes to lie
                 radius = np.maximum(self._closed_radius(points, pose[self.canthi], ball), np.abs(along) + 1e-3)
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
