@@ -73,7 +73,7 @@ class Lids:
         self._corner = np.isin(self.skin, self.canthi)
         self._corners = None
         self._near_faces = faces[free[faces].any(axis=1)]
-        self._rims = LidRims(vertices, faces[outer[faces].all(axis=1)], self.upper, self.lower)
+        self._rims = LidRims(vertices, faces[outer[faces].all(axis=1)], self.upper, self.lower, ball.center)
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
         self._ease = free.astype(float)
         self._ease[self.margin] = 0.0
@@ -145,17 +145,7 @@ class Lids:
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
             pose = pose + self.field(*slides)[:, None] * self.axis
-        return self.firm(self.lifted(self.rotated(pose, turns), ball, passing_mm))
-
-    def firm(self, pose):
-        """The pose (n, 3) with the rims as the margins carry them: turned with them, and else as at rest."""
-        rims = self._rims.carried
-        feet = rims.feet(pose)
-        turn = self.angles(feet) - self.angles(rims.feet(self.V))
-        carried = feet + self._about_axis(rims.offset, turn)
-        result = pose.copy()
-        result[rims.index] += rims.weight[:, None] * (carried - pose[rims.index])
-        return result
+        return self._rims.firm(self.lifted(self.rotated(pose, turns), ball, passing_mm))
 
     def field(self, upper, lower):
         """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
@@ -242,7 +232,7 @@ class Lids:
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self._met(self.firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
+        return self._met(self._rims.firm(self.lifted(pose + np.stack(spread, axis=1), ball), shut=True))
 
     def _met(self, pose):
         """The pose (n, 3) of closed lids whose rims lie on each other."""
