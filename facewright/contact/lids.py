@@ -145,7 +145,7 @@ class Lids:
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
             pose = pose + self.field(*slides)[:, None] * self.axis
-        return self._rims.firm(self.lifted(self.rotated(pose, turns), ball, passing_mm))
+        return self.lifted(self.rotated(pose, turns), ball, passing_mm)
 
     def field(self, upper, lower):
         """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
@@ -232,7 +232,7 @@ class Lids:
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self._met(self._rims.firm(self.lifted(pose + np.stack(spread, axis=1), ball), shut=True))
+        return self._met(self._rims.firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
 
     def _met(self, pose):
         """The pose (n, 3) of closed lids whose rims lie on each other."""

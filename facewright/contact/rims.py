@@ -14,8 +14,7 @@ _ENDS_MM = 2.0  # from a canthus: there it sets in
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
 _NO_AREA = 1e-12
-_FREE_MM = float(__import__("os").environ.get("FREE", "3"))
-_LEAN = np.radians(float(__import__("os").environ.get("LEAN", "30")))
+_LEAN = np.radians(30.0)
 _FIRM_MM, _SOFT_MM = 1.2, 3.5  # from the margin: so far a lid keeps its form whole, and not at all
 
 
@@ -74,24 +73,19 @@ class FirmRims:
         hung = [_hung(vertices, np.flatnonzero(side), line) for side, line in zip(sides, margins)]
         self._index, self._on, self._share, self._weight = zip(*hung)
         frames = self._frames(vertices)
-        self._offsets = [
-            np.einsum("kij,kj->ki", frame, vertices[index] - foot)
-            for index, (foot, frame) in zip(self._index, frames)
-        ]
-        # The way from the lower lid's line to the upper one, across both, says where the other lid is.
+        # The way from the lower margin to the upper one, across both, says on which side the other lid lies.
         up = vertices[margins[0][len(margins[0]) // 2]] - vertices[margins[1][len(margins[1]) // 2]]
-        self._over = [
-            sign * np.sign(frame[:, 2].sum(axis=0) @ up) for sign, (_, frame) in zip((-1.0, 1.0), frames)
-        ]
+        self._offsets = []
+        for index, (foot, frame), sign in zip(self._index, frames, (-1.0, 1.0)):
+            offset = np.einsum("kij,kj->ki", frame, vertices[index] - foot)
+            self._offsets.append(_leaning(offset, sign * np.sign(frame[:, 2].sum(axis=0) @ up)))
 
-    def __call__(self, pose, shut=False):
-        """The pose (n, 3) with rims as its margins carry them; shut: none leans steeply over its margin."""
+    def __call__(self, pose):
+        """The pose (n, 3) of shut lids with rims as its margins carry them, none of which leans over its margin much."""
         result = pose.copy()
         for number, (foot, frame) in enumerate(self._frames(pose)):
-            index, offset = self._index[number], self._offsets[number]
-            if shut:
-                offset = _leaning(offset, self._over[number])
-            carried = foot + np.einsum("kij,ki->kj", frame, offset)
+            index = self._index[number]
+            carried = foot + np.einsum("kij,ki->kj", frame, self._offsets[number])
             result[index] += self._weight[number][:, None] * (carried - pose[index])
         return result
 
@@ -128,8 +122,6 @@ def _hung(vertices, side, line):
     k = np.arange(len(side))
     weight = np.clip((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM), 0.0, 1.0)
     hangs = weight > 0.0
-    corner = np.linalg.norm(vertices[side][:, None] - vertices[line[[0, -1]]], axis=2).min(axis=1)
-    if _FREE_MM: weight = np.minimum(weight, np.clip(corner / _FREE_MM, 0.0, 1.0))
     weight = (weight * weight * (3.0 - 2.0 * weight))[hangs]
     return side[hangs], nearest[hangs], share[k, nearest][hangs], weight
 
