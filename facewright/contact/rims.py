@@ -14,14 +14,15 @@ _ENDS_MM = 2.0  # from a canthus: there it sets in
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
 _NO_AREA = 1e-12
-_LEAN = np.radians(30.0)
+_LEAN = np.radians(30.0)  # over its margin, of the rim of a shut lid
 _FIRM_MM, _SOFT_MM = 1.2, 3.5  # from the margin: so far a lid keeps its form whole, and not at all
 
 
 class LidRims:
     """The outer skin of the two lids of one eye, next to their margins.
 
-    vertices (n, 3) mm at rest, faces (m, 3) of the outer skin; upper, lower: margin vertices from canthus to canthus
+    vertices (n, 3) mm at rest, faces (m, 3) of the outer skin; upper, lower: margin vertices from canthus to canthus;
+    center (3,) of the eye. firm: FirmRims of them
     """
 
     def __init__(self, vertices, faces, upper, lower, center):
@@ -81,7 +82,7 @@ class FirmRims:
             self._offsets.append(_leaning(offset, sign * np.sign(frame[:, 2].sum(axis=0) @ up)))
 
     def __call__(self, pose):
-        """The pose (n, 3) of shut lids with rims as its margins carry them, none of which leans over its margin much."""
+        """The pose (n, 3) of shut lids with rims as the margins carry them; none leans over its margin much."""
         result = pose.copy()
         for number, (foot, frame) in enumerate(self._frames(pose)):
             index = self._index[number]
@@ -90,7 +91,7 @@ class FirmRims:
         return result
 
     def _frames(self, pose):
-        """For each lid: feet (k, 3) of its rim and frames (k, 3, 3), rows: along the margin, away from the eye, across."""
+        """Of each lid: feet (k, 3) of its rim, frames (k, 3, 3) of rows along the margin, away from the eye, across."""
         result = []
         for line, on, share in zip(self._margins, self._on, self._share):
             chain, share = pose[line], share[:, None]
