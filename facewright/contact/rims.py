@@ -15,7 +15,7 @@ _DEEPEST_MM = 4.0
 _ROUNDS = 3
 _NO_AREA = 1e-12
 _LEAN = np.radians(30.0)  # over its margin, of the rim of a shut lid
-_FIRM_MM, _SOFT_MM = 1.2, 3.5  # from the margin: so far a lid keeps its form whole, and not at all
+_FIRM_MM, _SOFT_MM = 1.2, 2.8  # from the margin: so far a lid keeps its form whole, and not at all
 
 
 class LidRims:
