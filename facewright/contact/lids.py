@@ -27,6 +27,7 @@ _SETTLINGS = 3
 _ENDS_MM = 4.0  # of the closing line, over which it rises to the canthi
 _FAR_MM = 2.0
 _WAVES = 2  # of the closing line between the canthi
+_RADIUS_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Lids:
         self._corner = np.isin(self.skin, self.canthi)
         self._corners = None
         self._near_faces = faces[free[faces].any(axis=1)]
-        self._rims = LidRims(vertices, faces[outer[faces].all(axis=1)], self.upper, self.lower)
+        self._rims = LidRims(vertices, faces[outer[faces].all(axis=1)], self.upper, self.lower, ball.center)
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
         self._ease = free.astype(float)
         self._ease[self.margin] = 0.0
@@ -184,11 +185,14 @@ class Lids:
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
-        offset = pose - self.ball.center
-        c, s = np.cos(field)[:, None], np.sin(field)[:, None]
+        return self.ball.center + self._about_axis(pose - self.ball.center, field)
+
+    def _about_axis(self, vectors, turns):
+        """Vectors (k, 3) turned by (k,) radians about the axis."""
+        c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
         axis = -self.axis
-        along = (offset @ axis)[:, None] * axis
-        return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
+        along = (vectors @ axis)[:, None] * axis
+        return along + c * (vectors - along) + s * np.cross(axis, vectors)
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
         """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
@@ -223,12 +227,12 @@ class Lids:
             along, theta = pose[line] @ self.axis - ball.center @ self.axis + slide, self.angles(pose[line])
             spokes = np.cos(theta)[:, None] * self.forward + np.sin(theta)[:, None] * self.up
             points = pose[line]
-            for _ in range(2):  # the ball's radius is asked where the point comes to lie
+            for _ in range(_RADIUS_ROUNDS):  # the radius is asked where the point comes to lie
                 radius = np.maximum(self._closed_radius(points, pose[self.canthi], ball), np.abs(along) + 1e-3)
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self._met(self.lifted(pose + np.stack(spread, axis=1), ball))
+        return self._met(self._rims.firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
 
     def _met(self, pose):
         """The pose (n, 3) of closed lids whose rims lie on each other."""

@@ -30,7 +30,7 @@ def needed_retraction(vertices, faces, blink, ball):
     found = [_pierced(vertices + weight * blink, faces, ball) for weight in _WEIGHTS]
     points, weights = np.concatenate(found), np.repeat(_WEIGHTS, [len(points) for points in found])
     back = 0.0
-    while len(points) and back < MOST_MM:
+    while len(points) and back < MOST_MM - 0.5 * STEP_MM:
         back += STEP_MM
         inside = ball.gap(points + (back * weights)[:, None] * [0.0, 0.0, 1.0]) < 0.0
         points, weights = points[inside], weights[inside]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.mesh.normals import normalized
 from facewright.mesh.seam import seam_sides
 
 _REACH_MM = 8.0  # over the skin from the margins: what the other lid may meet
@@ -13,19 +14,23 @@ _ENDS_MM = 2.0  # from a canthus: there it sets in
 _DEEPEST_MM = 4.0
 _ROUNDS = 3
 _NO_AREA = 1e-12
+_LEAN = np.radians(30.0)  # over its margin, of the rim of a shut lid
+_FIRM_MM, _SOFT_MM = 1.2, 2.8  # from the margin: so far a lid keeps its form whole, and not at all
 
 
 class LidRims:
     """The outer skin of the two lids of one eye, next to their margins.
 
-    vertices (n, 3) mm at rest, faces (m, 3) of the outer skin; upper, lower: margin vertices from canthus to canthus
+    vertices (n, 3) mm at rest, faces (m, 3) of the outer skin; upper, lower: margin vertices from canthus to canthus;
+    center (3,) of the eye. firm: FirmRims of them
     """
 
-    def __init__(self, vertices, faces, upper, lower):
+    def __init__(self, vertices, faces, upper, lower, center):
         sides = seam_sides(vertices, faces, upper, lower, _REACH_MM)
         margins = np.zeros(len(vertices), bool)
         margins[upper] = margins[lower] = True
         self.sides = [np.flatnonzero(side & ~margins) for side in sides]
+        self.firm = FirmRims(vertices, [side & ~margins for side in sides], (upper, lower), center)
         self.patches = []
         for side, line in zip(sides, (upper, lower)):
             mine = side.copy()
@@ -53,6 +58,73 @@ class LidRims:
             for mine, turn in zip(self.sides, turns):
                 turned[mine] += turn
         return turned - angle
+
+
+class FirmRims:
+    """The rims of both lids, which margins carry as they are: a rim is firm (the tarsus), skin beyond gives way.
+
+    Each vertex hangs on a point of its margin, in a frame of the margin's way there and of the ray from the eye's
+    centre: round a corner of the eye a rim turns with its margin, which comes to lie flat when the eye is shut.
+    vertices (n, 3) mm at rest, sides: masks (n,) of the outer skin of the upper and the lower lid; margins: the two
+    lines of vertices from canthus to canthus; center (3,) of the eye
+    """
+
+    def __init__(self, vertices, sides, margins, center):
+        self._margins, self._center = margins, center
+        hung = [_hung(vertices, np.flatnonzero(side), line) for side, line in zip(sides, margins)]
+        self._index, self._on, self._share, self._weight = zip(*hung)
+        frames = self._frames(vertices)
+        # The way from the lower margin to the upper one, across both, says on which side the other lid lies.
+        up = vertices[margins[0][len(margins[0]) // 2]] - vertices[margins[1][len(margins[1]) // 2]]
+        self._offsets = []
+        for index, (foot, frame), sign in zip(self._index, frames, (-1.0, 1.0)):
+            offset = np.einsum("kij,kj->ki", frame, vertices[index] - foot)
+            self._offsets.append(_leaning(offset, sign * np.sign(frame[:, 2].sum(axis=0) @ up)))
+
+    def __call__(self, pose):
+        """The pose (n, 3) of shut lids with rims as the margins carry them; none leans over its margin much."""
+        result = pose.copy()
+        for number, (foot, frame) in enumerate(self._frames(pose)):
+            index = self._index[number]
+            carried = foot + np.einsum("kij,ki->kj", frame, self._offsets[number])
+            result[index] += self._weight[number][:, None] * (carried - pose[index])
+        return result
+
+    def _frames(self, pose):
+        """Of each lid: feet (k, 3) of its rim, frames (k, 3, 3) of rows along the margin, away from the eye, across."""
+        result = []
+        for line, on, share in zip(self._margins, self._on, self._share):
+            chain, share = pose[line], share[:, None]
+            way = normalized(np.gradient(chain, axis=0))
+            foot, along = ((1.0 - share) * each[on] + share * each[on + 1] for each in (chain, way))
+            away = normalized(foot - self._center)
+            along = normalized(along - (along * away).sum(axis=1, keepdims=True) * away)
+            result.append((foot, np.stack([along, away, np.cross(along, away)], axis=1)))
+        return result
+
+
+def _leaning(offsets, over):
+    """Offsets (k, 3) in frames of the margin that lean over it, to the other lid's side, by _LEAN at most; over: the
+    sign of that side. What leans more is laid down, as far from the margin as before."""
+    out, across = offsets[:, 1], over * offsets[:, 2]
+    angle = np.arctan2(across, out)
+    size, lean = np.hypot(out, across), np.minimum(angle, _LEAN)
+    return np.stack([offsets[:, 0], size * np.cos(lean), over * size * np.sin(lean)], axis=1)
+
+
+def _hung(vertices, side, line):
+    """Vertices of one lid near its margin: their indices, the margin's edges that they hang on, the share of the way
+    along those, and how firmly they hang there."""
+    start, edge = vertices[line[:-1]], np.diff(vertices[line], axis=0)
+    share = ((vertices[side][:, None] - start) * edge).sum(axis=2) / np.maximum((edge**2).sum(axis=1), 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(vertices[side][:, None] - start - share[:, :, None] * edge, axis=2)
+    nearest = away.argmin(axis=1)
+    k = np.arange(len(side))
+    weight = np.clip((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM), 0.0, 1.0)
+    hangs = weight > 0.0
+    weight = (weight * weight * (3.0 - 2.0 * weight))[hangs]
+    return side[hangs], nearest[hangs], share[k, nearest][hangs], weight
 
 
 def _from_ends(chain):

@@ -9,7 +9,7 @@ from facewright.mesh.raster import Camera, RayScene
 
 MM_PER_PX = 0.2
 WIDTH_MM, HEIGHT_MM = 44.0, 34.0
-NEAR_MM = 40.0
+NEAR_MM = 70.0
 BLINK_VIEWS = ((0.0, 0.0), (-30.0, 0.0), (30.0, 0.0), (0.0, -30.0))
 SKIN_VIEWS = BLINK_VIEWS[:3]
 _THICK_MM = 3.0  # lid skin farther inside the ball than this is not what a ray should have met
