@@ -5,16 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.mesh.normals import vertex_normals
-from facewright.mesh.render import sample_texture
+from facewright.register.colors import texture_darkness
 from facewright.register.lines import DEEP_MM, CreaseOptions, arc_fractions, trace_crease
 from facewright.register.nonrigid import Rows
+from facewright.register.pairs import LIDS
 from facewright.register.skin import contact_rows, line_rows
 from facewright.scan.landmarks import EYE_LEFT, EYE_RIGHT, LIPS_INNER
 
-LID_LANDMARKS = {
-    "left": (362, 382, 381, 380, 374, 373, 390, 249, 263),
-    "right": (133, 155, 154, 153, 145, 144, 163, 7, 33),
-}
 EYES = {"left": EYE_LEFT, "right": EYE_RIGHT}
 CANTHI = ("mp133", "mp33", "mp362", "mp263")
 LID_CREASE = CreaseOptions(half_band_mm=3.0, overshoot_mm=4.0, prior_sigma_mm=1.5)
@@ -22,12 +19,16 @@ LID_CREASE = CreaseOptions(half_band_mm=3.0, overshoot_mm=4.0, prior_sigma_mm=1.
 # leaves the seam beside it (0.5, 2, 6, 20, 60 tried on a real scan: p95 of the seam 0.41, 0.29, 0.30, 0.35, 0.36 mm).
 # With the skin held to the model, 3 and 4: seam of a coarse scan 0.72, 0.69 mm, lips of known truth 0.52, 0.55.
 LINE_WEIGHT, CONTACT_WEIGHT, LID_CONTACT_WEIGHT, PLACED_ROW_WEIGHT = 4.0, 200.0, 10.0, 40.0
+BORDER_WEIGHT = 12.0
 CONTACT_SHARE = 0.2
 SLACK_MM, LANDMARK_WEIGHT, CANTHUS_WEIGHT = 1.5, 5.0, 15.0
 
 
-def leading_lines(scan, template, model, pairs, closed):
-    """The rows that lead the skin to feature lines found on the scan, and what to report."""
+def leading_lines(scan, template, model, pairs, closed, borders):
+    """The rows that lead the skin to feature lines found on the scan, and what to report.
+
+    borders dict side -> (upper, lower) lids.Border of open eyes, where the scan's colours show them
+    """
     stop = template.skin.vertices[1]
     normals = vertex_normals(model.vertices[:stop], template.faces[template.skin.face_slice])
     darkness = texture_darkness(scan)
@@ -49,6 +50,11 @@ def leading_lines(scan, template, model, pairs, closed):
             if crease.found:
                 leading += _lid_rows(template, model, pairs, crease, side, stop)
                 led |= set(EYES[side])
+    for side, lids in borders.items():
+        for border, which, numbers in zip(lids, ("upper", "lower"), LIDS[side]):
+            line = template.lines[f"lid_{which}_{side}"]
+            leading.append(line_rows(line, border, np.full(len(border.points), BORDER_WEIGHT), stop))
+            led |= set(numbers[1:-1])
     leading.append(_landmark_rows(pairs, stop, led))
     return tuple(leading), stats
 
@@ -148,7 +154,7 @@ def crease_trust(crease):
 def _lid_line(pairs, side, otherwise):
     """(k, 3) where shut lids meet by the landmarks, inner to outer canthus; the model's line without landmarks."""
     index = {name: i for i, name in enumerate(pairs.names)}
-    rows = [index[f"mp{i}"] for i in LID_LANDMARKS[side] if f"mp{i}" in index]
+    rows = [index[f"mp{i}"] for i in LIDS[side][1] if f"mp{i}" in index]
     return pairs.points[rows] if len(rows) >= 5 else otherwise
 
 
@@ -161,21 +167,3 @@ def _paired(upper, lower, vertices):
 
 def _from_right(line):
     return line if line[0, 0] < line[-1, 0] else line[::-1]
-
-
-def texture_darkness(scan):
-    """Function (faces, barycentric) -> darkness 0..1 of a textured scan, or None."""
-    if not scan.has_texture:
-        return None
-
-    def darkness(faces, barycentric):
-        uv = np.einsum("kc,kcd->kd", barycentric, scan.uv[scan.uv_faces[faces]])
-        result = np.zeros(len(faces))
-        which = scan.face_texture[faces] if scan.face_texture is not None else np.zeros(len(faces), np.int64)
-        for i, image in enumerate(scan.textures):
-            mine = which == i
-            if mine.any():
-                result[mine] = 1.0 - sample_texture(image, uv[mine])[:, :3].mean(axis=1) / 255.0
-        return result
-
-    return darkness

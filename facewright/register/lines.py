@@ -79,7 +79,7 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     strength = _valley_strength(depth, offsets, options)
     evidence = np.minimum(strength / DEEP_MM, 2.0) + np.minimum(_dark_strength(dark, options) / DARK, 1.0)
     inside = np.abs(offsets) <= options.half_band_mm
-    path = _best_path(evidence[:, inside], offsets[inside], options)
+    path = best_path(evidence[:, inside], offsets[inside], options)
     rows = np.flatnonzero(inside)[path]
     along = np.arange(len(columns))
     path_strength = strength[along, rows]
@@ -168,7 +168,7 @@ def _to_the_slit(vertices, faces, R, center, columns, height):
     )
 
 
-def _best_path(strength, offsets, options):
+def best_path(strength, offsets, options):
     """Row index per column of the strongest smooth path; the prior keeps it near the model's line."""
     scale = max(np.quantile(strength.max(axis=1), 0.5), 1e-6)
     prior = 0.5 * (offsets / options.prior_sigma_mm) ** 2

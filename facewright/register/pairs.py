@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +16,12 @@ PLACED_WEIGHT = 25.0
 BORDERS = {
     "lip_outer_upper": (185, 40, 39, 37, 0, 267, 269, 270, 409),
     "lip_outer_lower": (146, 91, 181, 84, 17, 314, 405, 321, 375),
+}
+
+# The upper and the lower lid of each eye, inner to outer canthus.
+LIDS = {
+    "left": ((362, 398, 384, 385, 386, 387, 388, 466, 263), (362, 382, 381, 380, 374, 373, 390, 249, 263)),
+    "right": ((133, 173, 157, 158, 159, 160, 161, 246, 33), (133, 155, 154, 153, 145, 144, 163, 7, 33)),
 }
 
 
@@ -88,6 +94,20 @@ def on_borders(rows, names, template):
             rows[landmark, chain[segment]] = 1.0 - share
             rows[landmark, chain[segment + 1]] = share
     return rows.tocsr()
+
+
+def on_lid_borders(pairs, borders):
+    """Pairs with the landmarks of lids moved up or down onto borders, a dict side -> (upper, lower) lids.Border."""
+    points = pairs.points.copy()
+    index = {name: i for i, name in enumerate(pairs.names)}
+    for side, lids in borders.items():
+        for border, numbers in zip(lids, LIDS[side]):
+            x, *rest = border.points.T
+            rows = np.array([index[f"mp{number}"] for number in numbers[1:-1]])
+            rows = rows[(points[rows, 0] > x[0]) & (points[rows, 0] < x[-1])]
+            for axis, values in zip((1, 2), rest):
+                points[rows, axis] = np.interp(points[rows, 0], x, values)
+    return replace(pairs, points=points)
 
 
 def eyes_closed(pairs):

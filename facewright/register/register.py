@@ -15,10 +15,11 @@ from facewright.mesh.untangle import reshaped, unfolded, untangled
 from facewright.register.correspond import Target
 from facewright.register.ears import ear_motion, hidden_ears
 from facewright.register.leading import leading_lines
+from facewright.register.lids import open_eyes
 from facewright.register.localize import localized_basis
 from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
-from facewright.register.pairs import eyes_closed, landmark_errors, landmark_pairs
+from facewright.register.pairs import eyes_closed, landmark_errors, landmark_pairs, on_lid_borders
 from facewright.register.refine import refine_model
 from facewright.register.skin import fit_skin, skin_rules, without_hair
 from facewright.scan.pose import face_edge_mm
@@ -72,12 +73,14 @@ def register(scan, landmarks, template, options=None, placed=()):
     target.compare_roughness(landmarks.positions(scan.vertices, scan.faces)[smooth])
     pairs = landmark_pairs(scan, landmarks, template, placed)
     closed = eyes_closed(pairs)
+    borders = open_eyes(scan, pairs, closed)
+    pairs = on_lid_borders(pairs, borders)
     edge_mm = face_edge_mm(scan.vertices, scan.faces)
     finely = edge_mm <= FACETS_MM
     rules = skin_rules(template)
     model, names = _fit_model(template, target.smoothed(edge_mm), rules, pairs, closed, options.model, finely)
     model = _with_ears(template, target, model)
-    leading, line_stats = leading_lines(scan, template, model, pairs, closed)
+    leading, line_stats = leading_lines(scan, template, model, pairs, closed, borders)
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(rules, template, model.vertices, target)
@@ -104,6 +107,7 @@ def register(scan, landmarks, template, options=None, placed=()):
         "identity_std": float(np.sqrt(np.mean(model.alpha**2))) if len(model.alpha) else 0.0,
         "landmarks_used": len(pairs.names),
         "landmark_mm": landmark_errors(pairs, fit),
+        "lid_borders": sorted(borders),
         "expression_found": expression,
         "T_template_to_ours": model.T.tolist(),
         **line_stats,
