@@ -111,9 +111,7 @@ def line_rows(line, crease, weights, n):
     and on heads with known truth it stretched the mouth by 3 mm at each corner (lips 1.8 mm off, 0.4 without).
     """
     points = crease.points
-    tangents = normalized(np.gradient(points, axis=0))
-    forward = np.broadcast_to(crease.forward, points.shape)
-    across = normalized(np.cross(forward, tangents))
+    forward, across = _frames(crease)
     tree = cKDTree(points)
     matrix = sp.csr_matrix((np.ones(len(line)), (np.arange(len(line)), line)), shape=(len(line), n))
 
@@ -127,6 +125,34 @@ def line_rows(line, crease, weights, n):
         ]
 
     return rows
+
+
+def border_rows(line, border, weight, slack_mm, n):
+    """Function of the current vertices: Rows that draw a line's vertices (k,) across to a border, by what is beyond.
+
+    border lids.Border; slack_mm: how far beside it they may lie. It says nothing of depth: held to the scan's there,
+    the skin around the eyes of five heads with known truth was 0.42 mm off, 0.32 without, 0.34 without any border.
+    """
+    points, across = border.points, _frames(border)[1]
+    tree = cKDTree(points)
+    matrix = sp.csr_matrix((np.ones(len(line)), (np.arange(len(line)), line)), shape=(len(line), n))
+
+    def rows(vertices):
+        nearest = tree.query(vertices[line])[1]
+        inside = (nearest > 0) & (nearest < len(points) - 1)
+        direction = across[nearest]
+        aside = np.einsum("kc,kc->k", direction, vertices[line] - points[nearest])
+        targets = points[nearest] + np.clip(aside, -slack_mm, slack_mm)[:, None] * direction
+        return [Rows(matrix, targets, weight * inside, direction)]
+
+    return rows
+
+
+def _frames(curve):
+    """forward (p, 3) and across (p, 3) at the points of a lines.Crease or lids.Border."""
+    tangents = normalized(np.gradient(curve.points, axis=0))
+    forward = np.broadcast_to(curve.forward, curve.points.shape)
+    return forward, normalized(np.cross(forward, tangents))
 
 
 def contact_rows(upper, lower, offsets, weight, n):

@@ -4,8 +4,9 @@ import numpy as np
 
 from facewright.mesh.normals import vertex_normals
 from facewright.register.correspond import Target
+from facewright.register.lids import Border
 from facewright.register.register import LEVELS
-from facewright.register.skin import fit_skin, skin_rules
+from facewright.register.skin import border_rows, fit_skin, skin_rules
 
 
 def test_what_the_model_lacks_is_taken_up_along_the_normal(hm08):
@@ -25,3 +26,14 @@ def test_what_the_model_lacks_is_taken_up_along_the_normal(hm08):
     assert np.abs(height)[face].mean() < 0.06
     assert slid[face].mean() < 0.06
     assert slid[face & (swelling > 0.5)].mean() < 0.25
+
+
+def test_a_border_pulls_straight_across_and_only_by_what_is_beyond_its_slack():
+    x = np.linspace(-10.0, 10.0, 81)
+    border = Border(np.stack([x, 0 * x, 0 * x], axis=1), np.array([0.0, 0.0, 1.0]))
+    vertices = np.array([[-4.0, 0.2, 3.0], [0.0, 1.0, 0.0], [3.0, -0.7, 0.0], [14.0, 2.0, 0.0]])
+    (rows,) = border_rows(np.arange(4), border, 12.0, 0.3, 4)(vertices)
+    gap = np.einsum("kc,kc->k", rows.normals, rows.targets - vertices)
+    assert np.allclose(gap * rows.normals[:, 1], [0.0, -0.7, 0.4, gap[3] * rows.normals[3, 1]])
+    assert np.allclose(np.abs(rows.normals[:, 1]), 1.0)
+    assert rows.weights.tolist() == [12.0, 12.0, 12.0, 0.0]
