@@ -17,7 +17,7 @@ from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
 
-_REACH_MM = {"lip_seam": 25.0, "lid": 10.0, "nostril": 14.0}  # from these lines: skin that may come to cross
+_REACH_MM = {"lip_seam": 25.0, "lid_": 10.0, "nostril": 14.0}  # from these lines: skin that may come to cross
 _TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
 _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
@@ -50,12 +50,12 @@ class _Crossings:
         farthest = np.where(self.outer, _SEEN_MM, _HIDDEN_MM)
         near = np.zeros(len(self.V), bool)
         for name, line in face.lines.items():
-            kind = name.rsplit("_", 1)[0] if name.startswith(("lip_seam", "nostril")) else name.split("_")[0]
-            reach = _REACH_MM.get(kind)
-            if kind == "lid":
+            reach = next((reach for start, reach in _REACH_MM.items() if name.startswith(start)), None)
+            if reach is None:
+                continue
+            if name.startswith("lid_"):
                 farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
-            if reach is not None:
-                near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=reach)[0] < reach
+            near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=reach)[0] < reach
         self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
         if "jawOpen" in targets.names:
             near |= np.abs(targets.delta("jawOpen")[self.at]).max(axis=1) > _MOVES_MM

@@ -185,14 +185,11 @@ class Lids:
 
     def rotated(self, pose, field):
         """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
-        return self.ball.center + self._about_axis(pose - self.ball.center, field)
-
-    def _about_axis(self, vectors, turns):
-        """Vectors (k, 3) turned by (k,) radians about the axis."""
-        c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
+        offset = pose - self.ball.center
+        c, s = np.cos(field)[:, None], np.sin(field)[:, None]
         axis = -self.axis
-        along = (vectors @ axis)[:, None] * axis
-        return along + c * (vectors - along) + s * np.cross(axis, vectors)
+        along = (offset @ axis)[:, None] * axis
+        return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
         """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
