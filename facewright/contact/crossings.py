@@ -13,6 +13,7 @@ from facewright.contact.parting import Parting
 from facewright.contact.targets import is_even
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
 from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
+from facewright.mesh.adjacency import differing
 from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
@@ -70,7 +71,7 @@ class _Crossings:
         far = max(np.abs(motion[self.at]).max(initial=0.0) for motion in motions) > _FAR_MM
         ways_out = [partial(out_of_teeth, self.teeth, head) for head in heads]
         # Outer skin that a shape leaves alone lies outside its region.
-        still = self.outer & ~np.any([motion[self.at].any(axis=1) for motion in motions], axis=0)
+        still = self.outer & ~np.any([differing(motion[self.at], 0.0) for motion in motions], axis=0)
         return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out, still)
 
     def with_shapes(self, targets, run):

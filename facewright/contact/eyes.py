@@ -18,6 +18,7 @@ from facewright.contact.lids import LidMotionOptions, Lids
 from facewright.contact.retraction import needed_retraction
 from facewright.contact.targets import Targets
 from facewright.conventions import corrective_name, in_between_name
+from facewright.mesh.normals import max_norms
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
@@ -226,7 +227,7 @@ class _Eye:
         """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose, over the ball as it lies."""
         delta = np.zeros(self.face.vertices.shape)
         delta[self.skin] = self.lids.settled(pose, ball) - (self.V if base is None else base)
-        delta[np.abs(delta).max(axis=1) < 1e-4] = 0.0
+        delta[max_norms(delta) < 1e-4] = 0.0
         return delta
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
-from facewright.mesh.adjacency import touching
+from facewright.mesh.adjacency import differing, touching
 from facewright.mesh.folds import laid_flat
+from facewright.mesh.normals import max_norms
 from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
 
 SEAM_MOBILITY = 0.2  # of the line where the lips meet
@@ -40,12 +41,12 @@ def lay_flat(face, targets):
     def flat(name):
         delta = targets.delta(name)
         pose = delta + sum(targets.delta(other) for other in _beneath(name, targets))
-        near = faces[touching(np.abs(pose[at]).max(axis=1) > _MOVES_MM, faces)]
+        near = faces[touching(max_norms(pose[at]) > _MOVES_MM, faces)]
         moved = V + pose[at]
         result = moved
         for _ in range(_ROUNDS):
             before, result = result, laid_flat(V, result, near, ease)
-            changed = np.flatnonzero((result != moved).any(axis=1))
+            changed = np.flatnonzero(differing(result, moved))
             if result is before:
                 break
             way = out_of_teeth(teeth, face.vertices + pose, result[changed])

@@ -20,7 +20,7 @@ from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.laplacian import lumped_mass
-from facewright.mesh.normals import dot, lengths, normalized, vertex_normals
+from facewright.mesh.normals import dot, lengths, max_norms, normalized, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.spread import SoftSpread
 from facewright.mesh.winding import winding_numbers
@@ -206,7 +206,7 @@ class LipContact:
     def _of_head(self, field):
         """(n, 3) a field of the surroundings of the lips (k, 3) as one of the whole head."""
         result = np.zeros_like(self.V)
-        result[self.used] = np.where(np.abs(field).max(axis=1, keepdims=True) < _NOTHING_MM, 0.0, field)
+        result[self.used] = np.where(max_norms(field)[:, None] < _NOTHING_MM, 0.0, field)
         return result
 
     def _wishes(self, skin, pose, watches):

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from facewright.mesh.adjacency import differing, touching
 from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
-from facewright.mesh.normals import lengths, normalized, vertex_normals
+from facewright.mesh.normals import lengths, max_norms, normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
 from facewright.mesh.winding import winding_numbers
 
@@ -107,7 +107,7 @@ class Parting:
         """Number of new crossings of a pose; those found are remembered with their sense."""
         now = pose.skin(field)
         if pose.looked is None:
-            stirred = np.abs(now - self.rest).max(axis=1) > _STILL_MM
+            stirred = max_norms(now - self.rest) > _STILL_MM
             pairs = self_intersections(now, self.faces, self._about(now, stirred)) if stirred.any() else pose.pairs
         else:
             touched = touching(differing(now, pose.looked), self.faces)
@@ -129,7 +129,8 @@ class Parting:
 
     def _folds(self, pose, field):
         """Number of folded faces of a pose among those that the correction moves."""
-        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, touching(field.any(axis=1), self.faces)))
+        moved = touching(differing(field, 0.0), self.faces)
+        return len(folded_by_shape(self.rest, pose.skin(field), self.faces, moved))
 
     def _flat(self, pose, field):
         """(k, 3) what turns back faces of a pose that have been folded."""
@@ -141,7 +142,7 @@ class Parting:
 
     def _out(self, pose, field):
         """(k, 3) what takes vertices of a pose that the correction moves out of what they must not enter."""
-        moved = np.flatnonzero(field.any(axis=1)) if len(pose.pairs) else []
+        moved = np.flatnonzero(differing(field, 0.0)) if len(pose.pairs) else []
         way = np.zeros_like(field)
         if len(moved):
             way[moved] = pose.way_out(pose.skin(field)[moved])

@@ -51,17 +51,17 @@ class Teeth:
             clearance[near] = self._before_all(back[near])
             near = near[clearance[near] == 0.0]
             near = near[self._winding(back[near]) > 0.5]
-            found = self._outside.closest(back[near])
-            way = found.points - back[near]
-            out = (dot(way, self._normals[found.faces]) > 0) & (found.distance < _MOST_MM)
+            points, faces, distance = self._outside.nearest(back[near])
+            way = points - back[near]
+            out = (dot(way, self._normals[faces]) > 0) & (distance < _MOST_MM)
             result[near[out]] = way[out] @ A.T
-        return result, clearance * np.linalg.svd(A, compute_uv=False)[-1]
+        return result, clearance * _least_stretch(A)
 
     def _before_all(self, points):
         """(k,) distance of points (k, 3) to the row, 0 for those behind its nearest face."""
-        found = self._surface.closest(points)
-        before = dot(found.points - points, self._surface_normals[found.faces]) <= 0
-        return np.where(before, found.distance, 0.0)
+        nearest, faces, distance = self._surface.nearest(points)
+        before = dot(nearest - points, self._surface_normals[faces]) <= 0
+        return np.where(before, distance, 0.0)
 
     def _winding(self, points):
         if not len(points):
@@ -84,6 +84,13 @@ def rows_of_teeth(template, vertices):
 def out_of_teeth(rows, head, points):
     """(k, 3) ways out of the rows_of_teeth for points (k, 3), zero outside; head (n, 3) in its pose."""
     return sum((row.way_out(points, head[place])[0] for place, row in rows), np.zeros_like(points))
+
+
+def _least_stretch(A):
+    """What a map (3, 3) leaves of a length, at least: by Gershgorin's circles, exact for turns and chords of one."""
+    squares = A.T @ A
+    least = 2.0 * np.diagonal(squares) - np.abs(squares).sum(axis=1)
+    return np.sqrt(max(least.min(), 0.0))
 
 
 def _outer_side(vertices, faces):

@@ -31,12 +31,16 @@ class Surface:
 
     def closest(self, points):
         """ClosestPoints of points (k, 3)."""
+        nearest, faces, distance = self.nearest(points)
+        barycentric = barycentric_coordinates(nearest, self.vertices.take(self.faces.take(faces, axis=0), axis=0))
+        return ClosestPoints(nearest, faces, barycentric, distance)
+
+    def nearest(self, points):
+        """points (k, 3), faces (k,) and distance (k,) of ClosestPoints, where nobody asks for more."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         squared, faces, nearest = self._tree.squared_distance(self.vertices, self.faces, points)
-        faces = np.asarray(faces).reshape(-1)
-        nearest = np.asarray(nearest).reshape(-1, 3)
-        barycentric = barycentric_coordinates(nearest, self.vertices[self.faces[faces]])
-        return ClosestPoints(nearest, faces, barycentric, np.sqrt(np.asarray(squared).reshape(-1)))
+        faces, nearest = np.asarray(faces).reshape(-1), np.asarray(nearest).reshape(-1, 3)
+        return nearest, faces, np.sqrt(np.asarray(squared).reshape(-1))
 
 
 def barycentric_coordinates(points, triangles):
@@ -46,14 +50,16 @@ def barycentric_coordinates(points, triangles):
     d00, d01, d11, d20, d21 = dot(v0, v0), dot(v0, v1), dot(v1, v1), dot(v2, v0), dot(v2, v1)
     denominator = d00 * d11 - d01 * d01
     good = denominator > 1e-30
-    safe = np.where(good, denominator, 1.0)
-    v = np.where(good, (d11 * d20 - d01 * d21) / safe, 0.0)
-    w = np.where(good, (d00 * d21 - d01 * d20) / safe, 0.0)
-    u, v, w = (np.clip(share, 0.0, 1.0) for share in (1 - v - w, v, w))
-    return np.stack([u, v, w], axis=1) / (u + v + w)[:, None]
+    safe = np.where(good, denominator, np.inf)
+    shares = np.empty((len(points), 3))
+    shares[:, 1] = (d11 * d20 - d01 * d21) / safe
+    shares[:, 2] = (d00 * d21 - d01 * d20) / safe
+    shares[:, 0] = 1 - shares[:, 1] - shares[:, 2]
+    np.clip(shares, 0.0, 1.0, out=shares)
+    return shares / (shares[:, 0] + shares[:, 1] + shares[:, 2])[:, None]
 
 
 def interpolate(values, F, faces, barycentric):
     """Values (n, ...) at points given by (k,) faces and (k, 3) barycentric coordinates: (k, ...)."""
-    corners = values[F[faces]]  # (k, 3, ...)
+    corners = values.take(F.take(faces, axis=0), axis=0)  # (k, 3, ...)
     return np.einsum("kc,kc...->k...", barycentric, corners)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.mesh.adjacency import differing, dilate, touching, within
-from facewright.mesh.normals import cross, dot, face_areas, face_cross, face_normals, lengths
+from facewright.mesh.normals import cross, dot, face_areas, face_corners, face_cross, face_normals, lengths
 
 _HARDLY_TURNED = 0.85  # cosine: a face turned by less than 32 degrees does not lie upside down in what is around it
 _LEAST_SHARE = 0.1  # of its area at rest that a face keeps, seen along the normal that it should have
@@ -45,11 +45,9 @@ def _expected_normals(neutral, moved, faces, asked):
 def _vertex_covariance(neutral, moved, faces):
     """(n, 3, 3) sums over the faces at a vertex of (rest edge)(moved edge)^T."""
     total = np.zeros((len(neutral), 3, 3))
-    outer = sum(
-        (neutral[faces[:, b]] - neutral[faces[:, a]])[:, :, None]
-        * (moved[faces[:, b]] - moved[faces[:, a]])[:, None, :]
-        for a, b in ((0, 1), (1, 2), (2, 0))
-    )
+    rest, now = face_corners(neutral, faces), face_corners(moved, faces)
+    edges = ((0, 1), (1, 2), (2, 0))
+    outer = sum((rest[b] - rest[a])[:, :, None] * (now[b] - now[a])[:, None, :] for a, b in edges)
     for corner in range(3):
         np.add.at(total, faces[:, corner], outer)
     return total
@@ -108,7 +106,7 @@ def _way_back(points, faces, normals, least, ease):
     if not len(small):
         return None
     F, n = faces[small], normals[small]
-    a, b, c = points[F[:, 0]], points[F[:, 1]], points[F[:, 2]]
+    a, b, c = face_corners(points, F)
     gradient = 0.5 * np.stack([cross(b - c, n), cross(c - a, n), cross(a - b, n)], axis=1)
     w = ease[F]
     size = (w * (gradient**2).sum(axis=2)).sum(axis=1)

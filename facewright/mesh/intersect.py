@@ -3,6 +3,8 @@
 import igl.predicates
 import numpy as np
 
+from facewright.mesh.normals import face_corners
+
 _CLUSTER_MM = 8.0  # faces asked about are looked for together with those this near
 
 
@@ -39,7 +41,7 @@ def intersections_of(vertices, faces, asked):
 
 def _face_boxes(vertices, faces):
     """Lower and upper corners (3, m) of the boxes around faces."""
-    a, b, c = (vertices[faces[:, i]].T for i in range(3))
+    a, b, c = (corner.T for corner in face_corners(vertices, faces))
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 

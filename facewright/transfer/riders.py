@@ -38,6 +38,7 @@ class LidRiders:
     """The riding parts of one side on any head of a template's topology.
 
     index (r,) the template's vertices that ride; root_faces (r,), root_barycentric (r, 3) their roots on the skin
+    carriers (c,) vertices of the skin that these, and the directions there, depend on
     """
 
     def __init__(self, template, side):
@@ -50,6 +51,7 @@ class LidRiders:
         points = template.vertices[self.index]
         self.root_faces, self.root_barycentric = self._roots(points, ball)
         self.before, self.after = self._margin_beside(template)
+        self.carriers = np.unique(np.concatenate([template.faces[self.root_faces].ravel(), self.before, self.after]))
         root, frames = self._frames(template.vertices, ball)
         self._offset = np.einsum("rij,rj->ri", frames, points - root)
         gap = ball.gap(points)
@@ -111,11 +113,13 @@ def ride_on_lids(face, deltas, names, correctives=None):
         ball = carried_eyeball(face.template, face.vertices, side)
         rest = riders.placed(face.vertices, ball)
         eye = face.template.part(f"eye_{side}").vertex_slice
+        carriers = np.concatenate([riders.carriers, np.arange(eye.start, eye.stop)])
         for number, name in enumerate(names):
             drivers = [names.index(driver) for driver in (correctives or {}).get(name, ())]
-            pose = deltas[number] + sum(deltas[driver] for driver in drivers)
+            together = [deltas[target] for target in (number, *drivers)]
             moved = rest
-            if pose.any():
+            if any(delta[carriers].any() for delta in together):
+                pose = sum(together)
                 moved = riders.placed(face.vertices + pose, _moved(ball, face.vertices[eye], pose[eye]))
             result[number, riders.index] = moved - rest - sum(result[driver, riders.index] for driver in drivers)
     return result
