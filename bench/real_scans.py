@@ -21,8 +21,10 @@ from features import LJSON_TO_IBUG, feature_points, ibug_positions, off_by_mm, p
 from PIL import Image
 
 from facewright.evaluate.distances import benchmark_scale, interpupillary_mm, measure_distances
-from facewright.evaluate.quality import folded_faces, measure_quality, region_faces
+from facewright.evaluate.quality import measure_quality, region_faces
 from facewright.evaluate.seam import measure_seam
+from facewright.mesh.closest import Surface
+from facewright.mesh.facing import folded_faces
 from facewright.mesh.raster import Camera
 from facewright.mesh.render import render
 from facewright.parts import fit_parts
@@ -154,7 +156,7 @@ def check_james(where, template, verdict, pictures):
     check_soundness(where, figures, verdict)
     check(where, "published points, mean", published_points(where, found, face, scale), 3.0)
     skin = region_faces(face.regions["outer"], template.faces)
-    folded = folded_faces((found.scan.vertices, found.scan.faces), face.fit, template.faces, skin)
+    folded = folded_faces(Surface(found.scan.vertices, found.scan.faces), face.fit, template.faces, skin)
     print(f"folded faces anywhere outside, hair and ears with them: {len(folded)}")
     write_pictures(pictures, where, found, face)
 

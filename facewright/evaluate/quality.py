@@ -5,52 +5,17 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.evaluate.distances import on_border, sample_surface
 from facewright.mesh.adjacency import unique_edges
-from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.closest import Surface
+from facewright.mesh.facing import folded_faces
 from facewright.mesh.intersect import self_intersections
-from facewright.mesh.normals import face_cross, face_normals, lengths, vertex_normals
+from facewright.mesh.normals import face_cross, lengths
 from facewright.mesh.raster import Camera, RayScene
 
-SURFACE_NEARBY_MM = 3.0
 VIEWS_OF_MOUTH = ((0.0, 0.0), (-35.0, 0.0), (35.0, 0.0), (0.0, 20.0), (0.0, -20.0))
 RIM_MM, LIP_RIM_MM = 2.0, 1.0
 FINE = 5  # rays along the side of a pixel that is looked at closely
 CANTHI, CORNERS = ("mp133", "mp33", "mp362", "mp263"), ("mp61", "mp291")
-
-
-def folded_faces(scan, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
-    """Indices of faces whose normal is more than 90 degrees from the scan's there.
-
-    scan (vertices, faces); fit (n, 3); faces (m, 3); mask (m,) bool: the faces asked about
-    Only where the scan has surface within nearby_mm that is no border. In a crease (lips, lids, alar grooves) the
-    nearest point may lie on the far wall; so a face counts only if no scan point about as near faces its way.
-    """
-    asked = np.flatnonzero(mask)
-    vertices, scan_faces = scan
-    centers, normals = fit[faces[asked]].mean(axis=1), face_normals(fit, faces[asked])
-    nearest = Surface(vertices, scan_faces).closest(centers)
-    scan_normals = vertex_normals(vertices, scan_faces)
-    there = interpolate(scan_normals, scan_faces, nearest.faces, nearest.barycentric)
-    present = (nearest.distance < nearby_mm) & ~on_border(scan_faces, nearest.faces, nearest.barycentric)
-    suspects = np.flatnonzero(present & ((normals * there).sum(axis=1) < 0))
-    if not len(suspects):
-        return asked[suspects]
-    samples = sample_surface(vertices, scan_faces, count, _near_box(vertices, scan_faces, centers[suspects]))
-    sample_normals = face_normals(vertices, scan_faces)[samples.faces]
-    tree = cKDTree(samples.points)
-    folded = []
-    for suspect in suspects:
-        around = tree.query_ball_point(centers[suspect], nearest.distance[suspect] + 0.6)
-        if not len(around) or (sample_normals[around] @ normals[suspect]).max() < 0:
-            folded.append(suspect)
-    return asked[np.array(folded, np.int64)]
-
-
-def _near_box(vertices, faces, points, margin_mm=5.0):
-    """(m,) bool: faces in the box around points (k, 3)."""
-    centers = vertices[faces].mean(axis=1)
-    return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)
 
 
 def torn_edges(neutral, moved, faces, mask=None, *, edges=None, grow_mm=4.0, factor=3.0):
@@ -154,7 +119,7 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     in_face = region_faces(regions["face"], faces)
     skin = np.zeros(len(faces), bool)
     skin[template.skin.face_slice] = True
-    folded = folded_faces((scan.vertices, scan.faces), fit, faces, in_face & skin)
+    folded = folded_faces(Surface(scan.vertices, scan.faces), fit, faces, in_face & skin)
     lid_rim, lip_rim = _rims(template, fit, lines)
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)

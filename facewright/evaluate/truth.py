@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.evaluate.distances import sample_surface, summary, surface_faces
+from facewright.evaluate.distances import summary, surface_faces
 from facewright.mesh.closest import Surface
+from facewright.mesh.sampling import sample_surface
 
 REGIONS = ("face", "lips", "eyes", "nostrils")
 

@@ -69,4 +69,4 @@ def reshaped(vertices, reference, faces, free):
     L = uniform_laplacian(faces[around[faces].any(axis=1)], len(vertices)).tocsr()
     bending = (L.T @ L).tocsr()[free]
     offset[free] = Factorization(bending[:, free]).solve(-(bending[:, ~free] @ offset[~free]))
-    return laid + offset
+    return np.where(free[:, None], laid + offset, vertices)

@@ -7,16 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from facewright.data import Face
-from facewright.mesh.adjacency import dilate
-from facewright.mesh.intersect import self_intersections
-from facewright.mesh.normals import normalized
 from facewright.mesh.openness import vertex_openness
-from facewright.mesh.untangle import reshaped, unfolded, untangled
 from facewright.register.correspond import Target
 from facewright.register.ears import ear_motion, hidden_ears
 from facewright.register.leading import leading_lines
 from facewright.register.lids import open_eyes
 from facewright.register.localize import localized_basis
+from facewright.register.mend import facing_the_scan, without_folds, without_knots
 from facewright.register.model import Expressions, ModelOptions, fit_model
 from facewright.register.neutral import take_out_expression
 from facewright.register.pairs import eyes_closed, landmark_errors, landmark_pairs, on_lid_borders
@@ -31,12 +28,7 @@ SIDES = {"left": "Left", "right": "Right"}
 # How far a smile strays from rest, and shut lids from the template's blink.
 SMILE_STD, SHUT_STD = 0.1, 0.15
 SMOOTH_LANDMARKS = (50, 280, 205, 425, 117, 346, 101, 330, 36, 266, 151, 9, 108, 337)
-# Rings of vertices around a knot in which everything gives way, or takes the template's shape, tried in turn.
-GIVING_WAY, RESHAPED = (0, 1, 2, 3), (2, 3, 4, 5)
-FOLD_MM = 3.0  # a face is only held to look as the scan does where the scan is this near
 PLAINLY_OPEN = 0.4  # several times what matters (Target.MIN_OPENNESS)
-LED_LINES = ("lip_seam", "lid_")
-KNOTTY = ("eyes", "lips", "socket_left", "socket_right")
 
 
 @dataclass(frozen=True)
@@ -88,9 +80,10 @@ def register(scan, landmarks, template, options=None, placed=()):
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
     levels = LEVELS + DETAIL if finely else LEVELS
     skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
-    skin = _unfolded(template, skin, faces, matches, "lips")
+    skin = facing_the_scan(template, skin, faces, matches, "lips")
     fit = model.vertices.copy()
-    fit[:stop] = _without_knots(template, _unfolded(template, skin, faces, matches, "eyes"), faces)
+    fit[:stop] = without_knots(template, facing_the_scan(template, skin, faces, matches, "eyes"), faces)
+    fit[:stop] = without_folds(template, fit[:stop], faces, target.surface)
     expression = {name: round(float(w), 4) for together, w in zip(names, model.expression) for name in together}
     neutral, removed = fit, {}
     if options.eyes == "template":
@@ -98,7 +91,7 @@ def register(scan, landmarks, template, options=None, placed=()):
         rest, removed = take_out_expression(template, model, skin, expression)
         if removed:
             neutral = model.rest.copy()
-            neutral[:stop] = _without_knots(template, rest, faces)
+            neutral[:stop] = without_knots(template, rest, faces)
     observed = np.zeros(len(fit), bool)
     observed[:stop] = matches.weights > 0.05
     stats = {
@@ -186,68 +179,6 @@ def _hidden_ears(template, target, vertices):
 def _ears(template):
     """Masks (n,) of the skin's ears."""
     return [template.regions[f"ear_{side}"][: template.skin.vertices[1]] for side in SIDES]
-
-
-def _unfolded(template, skin, faces, matches, region):
-    """Skin (n, 3) without faces of a region that look away from the scan, as in the groove at a corner of the mouth."""
-    n = len(skin)
-    asked = (template.regions[region] & template.regions["outer"])[:n] & (matches.distance < FOLD_MM)
-    expected = normalized(matches.normals[faces].sum(axis=1)) * asked[faces].all(axis=1)[:, None]
-    keep = np.zeros(n, bool)
-    for name, line in template.lines.items():
-        if name.startswith(LED_LINES):
-            keep[line] = True
-    return unfolded(skin, faces, expected, keep)
-
-
-def _without_knots(template, skin, faces):
-    """Skin (n, 3) with the knots of lips and lids smoothed away.
-
-    The lip seam and the skin beside them hold; what lies around a knot gives way only where it does not come loose, and
-    what smoothing does not loosen takes the template's shape.
-    """
-    n = len(skin)
-    knotty = np.any([template.regions[name][:n] for name in KNOTTY], axis=0)
-    seam = np.zeros(n, bool)
-    seam[[template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]]] = True
-    in_face = template.regions["face"][:n][faces].all(axis=1)
-
-    def crossing(vertices):
-        pairs = self_intersections(vertices, faces)
-        return np.unique(pairs[in_face[pairs].any(axis=1)])
-
-    best = untangled(skin, faces, ~knotty | seam)
-    left = crossing(best)
-    knot = np.zeros(n, bool)
-    knot[faces[left].ravel()] = True
-    for rings in GIVING_WAY:
-        if not len(left):
-            break
-        tried = _closed_as(skin, untangled(skin, faces, (~knotty | seam) & ~dilate(knot, faces, rings)), template)
-        remaining = crossing(tried)
-        if len(remaining) < len(left):
-            best, left = tried, remaining
-    for rings in RESHAPED:
-        if not len(left):
-            break
-        knot[:] = False
-        knot[faces[left].ravel()] = True
-        shape = reshaped(best, template.vertices[:n], faces, dilate(knot, faces, rings) & knotty)
-        tried = _closed_as(skin, shape, template)
-        remaining = crossing(tried)
-        if len(remaining) < len(left):
-            best, left = tried, remaining
-    return best
-
-
-def _closed_as(before, after, template):
-    """Skin (n, 3) after smoothing, with paired lip points as far apart as they were before."""
-    upper, lower = template.lines["lip_seam_upper"], template.lines["lip_seam_lower"]
-    half = (before[upper] - before[lower]) / 2
-    middle = (after[upper] + after[lower]) / 2
-    closed = after.copy()
-    closed[upper], closed[lower] = middle + half, middle - half
-    return closed
 
 
 def _hidden(rules, observed):

@@ -16,29 +16,6 @@ def plane(n=21, size=20.0, z=0.0):
     return vertices, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def test_samples_spread_by_area_and_lie_on_their_faces():
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 5], [3, 0, 5], [0, 3, 5]])
-    faces = np.array([[0, 1, 2], [3, 4, 5]])  # areas 0.5 and 4.5
-    samples = distances.sample_surface(vertices, faces, 1000)
-    assert (samples.faces == 1).sum() == 900
-    assert np.allclose(samples.barycentric.sum(axis=1), 1)
-    assert samples.barycentric.min() >= 0
-    assert set(np.unique(samples.points[:, 2])) == {0.0, 5.0}
-
-
-def test_samples_are_even_inside_a_face():
-    vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
-    points = distances.sample_surface(vertices, faces, 4000).points
-    assert np.allclose(points.mean(axis=0), [1 / 3, 1 / 3, 0], atol=2e-3)
-
-
-def test_samples_of_a_subset_stay_in_it():
-    vertices, faces = plane()
-    subset = np.arange(len(faces)) < 10
-    assert (distances.sample_surface(vertices, faces, 100, subset).faces < 10).all()
-    assert not len(distances.sample_surface(vertices, faces, 100, np.zeros(len(faces), bool)).points)
-
-
 def test_parallel_planes_are_their_gap_apart_both_ways():
     scan, (fit, faces) = plane(z=0.5), plane(n=9)
     everything = {"face": np.ones(len(fit), bool)}
@@ -96,16 +73,6 @@ def test_hidden_faces_are_left_out_and_counted():
     hidden = scan[0][scan[1]].mean(axis=1)[:, 0] < 5.0
     figures = distances.scan_to_face(scan, fit, faces, {"all": np.ones(len(fit), bool)}, hidden=hidden)["all"]
     assert figures["left_out"] == pytest.approx(0.25, abs=0.01)
-
-
-def test_border_points_are_those_on_border_edges_and_corners():
-    _, faces = plane(n=3)  # one inner vertex, 4
-    at = np.array([f for f in range(len(faces)) if 4 in faces[f]])[:1]
-    inner = (faces[at[0]] == 4).astype(float)[None]
-    assert not distances.on_border(faces, at, inner)[0]
-    corner = (faces[0] == 0).astype(float)[None]
-    assert distances.on_border(faces, np.array([0]), corner)[0]
-    assert not distances.on_border(faces, at, np.full((1, 3), 1 / 3))[0]
 
 
 def test_no_samples_give_no_figures():
