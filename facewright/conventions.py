@@ -27,6 +27,9 @@ MOUTH_PAIRS = (
 )
 """Pairs of shapes that lids and lips must survive together; a name without its side stands for both sides."""
 
+TONGUE_PAIR = ("tongueOut", "jawOpen")
+"""A tongue that comes out of an open mouth; by itself it opens the mouth as far as it needs."""
+
 SHUT_SHAPES = tuple(
     """jawForward jawLeft jawRight mouthPucker mouthLeft mouthRight mouthSmile mouthFrown mouthDimple mouthStretch
     mouthRollLower mouthRollUpper mouthShrugLower mouthPress cheekPuff""".split()

@@ -12,14 +12,13 @@ from scipy.spatial import cKDTree
 from facewright.contact.parting import Parting
 from facewright.contact.targets import is_even
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
-from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR
 from facewright.mesh.adjacency import differing
 from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
 
 _REACH_MM = {"lip_seam": 25.0, "lid_": 10.0, "nostril": 14.0}  # from these lines: skin that may come to cross
-_TONGUE = "tongueOut", "jawOpen"  # made for an open jaw
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
 _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
 _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
@@ -94,7 +93,7 @@ class _Crossings:
     def with_pairs(self, targets, run):
         """Targets whose named pairs have none."""
         extras = dict(targets.extras)
-        windows = [(EYE_PAIRS, self.is_left), ((*MOUTH_PAIRS, _TONGUE), self.left)]
+        windows = [(EYE_PAIRS, self.is_left), ((*MOUTH_PAIRS, TONGUE_PAIR), self.left)]
         pairs = [(_of_pair(pair, targets), window) for pairs, window in windows for pair in pairs]
 
         def field(names):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.conventions import EYE_PAIRS, INTERPUPILLARY_MM, MOUTH_PAIRS, mirrored_name
+from facewright.conventions import EYE_PAIRS, INTERPUPILLARY_MM, MOUTH_PAIRS, TONGUE_PAIR, mirrored_name
 from facewright.evaluate.eyes import margin_gap_mm
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.quality import torn_edges
@@ -18,7 +18,7 @@ MIRROR_X = np.array([-1.0, 1.0, 1.0])
 SWAPPED = {"jawLeft": "jawRight", "mouthLeft": "mouthRight"}
 MOVES_MM = 0.1
 MIRROR_BAR_MM = 0.01
-BASES = {"mouthClose": "jawOpen", "tongueOut": "jawOpen"}
+BASES = {"mouthClose": "jawOpen"}
 EYE_OPENING_MM = 11.0  # of the eye that a blink's amplitude is said of: a lid goes no farther than its eye is open
 _STILL_MM = 1e-4
 
@@ -84,7 +84,7 @@ def shape_names(rig):
 def measure_shapes(rig):
     """dict shape -> {"max_mm", "folded", "torn", "self_intersections"} of the skin at weight 1.
 
-    mouthClose and tongueOut are made for an open jaw: their folds and crossings are those of the pose with jawOpen.
+    mouthClose is made for an open jaw: its folds and crossings are those of the pose with jawOpen.
     Halves stand beside their sums.
     """
     check, play = SkinCheck(rig), Player(rig, full=True)
@@ -172,9 +172,11 @@ def mirror_mm(rig, mirror):
 
 
 def pair_crossings(rig):
-    """ "a + b" -> new crossing pairs of faces in each of the pairs that lids and lips must survive."""
+    """ "a + b" -> new crossing pairs of faces in each of the pairs that lids and lips must survive, and with the tongue
+    out of an open mouth."""
     check, play = SkinCheck(rig), Player(rig, full=True)
-    poses = {" + ".join(pair): both_sides(dict.fromkeys(pair, 1.0), play.names) for pair in (*EYE_PAIRS, *MOUTH_PAIRS)}
+    pairs = (*EYE_PAIRS, *MOUTH_PAIRS, TONGUE_PAIR)
+    poses = {" + ".join(pair): both_sides(dict.fromkeys(pair, 1.0), play.names) for pair in pairs}
     return {name: check.crossing(play(check.skin, weights)) for name, weights in poses.items() if weights is not None}
 
 
