@@ -16,6 +16,7 @@ from facewright.working_set import read_working_set
 
 _STILL_MM = 1e-6
 SKIN_MAPS = ("albedo", "normal")
+_DIMMED, _LEAST_LIGHT = 0.25, 0.6  # power of the light that a scan's eyes lack, and least share, that the rig's lack
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,9 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     returns data.Rig: one mesh per part, the skin first; a part that no shape moves has no targets
     """
     options = options or AssemblyOptions()
-    seen = face.stats.get("parts", {}).get("iris_color")
-    if options.eyes is not None and options.eyes.iris_color is None and seen is not None:
-        options = replace(options, eyes=replace(options.eyes, iris_color=tuple(seen)))
+    seen = face.stats.get("parts", {})
+    if options.eyes is not None and options.eyes.iris_color is None and "eye_light" in seen:
+        options = replace(options, eyes=_as_seen(options.eyes, seen["iris_color"], seen["eye_light"]))
     maps = maps or {}
     template = face.template
     words = read_working_set()
@@ -127,6 +128,14 @@ def _weights(template, part):
     weights = np.zeros((part.vertices[1] - part.vertices[0], len(template.skeleton.names)))
     weights[:, template.skeleton.names.index(bone)] = 1.0
     return weights
+
+
+def _as_seen(look, iris_color, light):
+    """The EyeLook of a scan's irises. Where a photograph has the eyes in the shade, so it has all of the face: eyes in
+    full light would glow in it, so they get a little less."""
+    dimmed = max(light**_DIMMED, _LEAST_LIGHT)
+    color, white = (tuple(dimmed * np.asarray(part)) for part in (iris_color, look.sclera_color))
+    return replace(look, iris_color=color, sclera_color=white)
 
 
 def _material(template, part, maps, options):

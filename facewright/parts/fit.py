@@ -62,7 +62,8 @@ def fit_parts(face, options=None, irises=None):
             pupil = ball.center + ball.radius * ball.axis
             stats[f"eye_{side}"]["iris_off_mm"] = float(np.linalg.norm(irises[side].center - pupil[:2]))
     if irises:
-        stats["iris_color"] = np.mean([iris.color for iris in irises.values()], axis=0).tolist()
+        stats["iris_color"] = np.mean([iris.lit_color for iris in irises.values()], axis=0).tolist()
+        stats["eye_light"] = float(np.mean([iris.light for iris in irises.values()]))
     mouth = [part for part in template.parts if part.attach in ("skull", "jaw")]
     if mouth:
         V, stats["mouth"] = _fit_mouth(template, V, face.lines, mouth, options)

@@ -13,7 +13,7 @@ from facewright.mesh.render import linear_to_srgb
 from facewright.transfer.eyeball import angle_from
 
 _RIM_DEG = 16.0
-BROWN = (0.16, 0.115, 0.07)
+BROWN, WHITE = (0.16, 0.115, 0.07), (0.78, 0.74, 0.70)
 _VEINS, _VEINS_DEG, _SECTOR = 34, (34.0, 100.0), 0.45
 _DARK = 0.004  # linear: what is seen through a pupil
 
@@ -32,7 +32,7 @@ class EyeLook:
     iris_deg: float = 29.5
     pupil_deg: float = 9.5
     iris_color: tuple[float, float, float] | None = None
-    sclera_color: tuple[float, float, float] = (0.78, 0.74, 0.70)
+    sclera_color: tuple[float, float, float] = WHITE
     pattern: str = "fibres"
     size: int = 512
 

@@ -15,6 +15,7 @@ import numpy as np
 from facewright.mesh.closest import interpolate
 from facewright.mesh.raster import RayScene
 from facewright.mesh.render import sample_texture, srgb_to_linear
+from facewright.parts.iris import WHITE
 
 RADIUS_MM = (5.0, 6.6)
 _STEP_MM = 0.25
@@ -24,16 +25,34 @@ _RING = (0.42, 0.80)  # shares of the iris's radius between which its colour is 
 _TRIM = (0.15, 0.9)  # quantiles of light kept in that ring
 _LEAST_CONTRAST = 0.12
 _LEAST_PIXELS = 60
+_BESIDE, _BRIGHT = 1.1, (0.75, 0.95)  # radii from which on there is white; quantiles of light that show it, not gleams
+_LIT = 0.5  # share of a white's light from which on an eye counts as lit: whites differ, and lids throw shadows
+_DARKEST = 0.01  # a white darker than this says nothing
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
 class Iris:
-    """center (2,) x, y mm; radius mm; color (3,) linear RGB; contrast of its edge, a share of the white's light."""
+    """center (2,) x, y mm; radius mm; color (3,) linear RGB; contrast of its edge, a share of the white's light.
+
+    white (3,) linear RGB of the white beside it, as the scan shows it: in the shade of brows and lids it may be dark
+    """
 
     center: np.ndarray
     radius: float
     color: np.ndarray
     contrast: float
+    white: np.ndarray
+
+    @property
+    def light(self):
+        """Share in 0..1 of the light that an eye in the open has: 1 for a white as bright as can be told from one."""
+        return float(min(1.0, self.white @ LUMINANCE / (_LIT * np.dot(WHITE, LUMINANCE))))
+
+    @property
+    def lit_color(self):
+        """(3,) linear RGB of the iris in as much light as makes its white one: photographs have eyes in the shade."""
+        return self.color * np.maximum(1.0, _LIT * np.array(WHITE) / np.maximum(self.white, _DARKEST))
 
 
 def find_irises(scan, face):
@@ -53,7 +72,7 @@ def _find(scan, vertices, lines, side):
     clear = room > _SHADE_MM
     if clear.sum() < _LEAST_PIXELS:
         return None
-    light = colors @ [0.2126, 0.7152, 0.0722]
+    light = colors @ LUMINANCE
     center, radius, contrast = _circle(points[clear], light[clear], np.concatenate([upper, lower])[:, :2].mean(axis=0))
     if contrast < _LEAST_CONTRAST:
         return None
@@ -63,7 +82,12 @@ def _find(scan, vertices, lines, side):
         return None
     low, high = np.quantile(light[ring], _TRIM)
     kept = ring & (light >= low) & (light <= high)
-    return Iris(center, radius, colors[kept].mean(axis=0), contrast)
+    beside = clear & (distance > _BESIDE)
+    if not beside.any():
+        return None
+    low, high = np.quantile(light[beside], _BRIGHT)
+    white = colors[beside & (light >= low) & (light <= high)].mean(axis=0)
+    return Iris(center, radius, colors[kept].mean(axis=0), contrast, white)
 
 
 def _opening(upper, lower):

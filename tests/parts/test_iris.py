@@ -6,8 +6,8 @@ import pytest
 from facewright.data import Scan
 from facewright.evaluate.iris import color_difference
 from facewright.mesh.render import linear_to_srgb
-from facewright.parts.iris import PATTERNS, EyeLook, eye_colors
-from facewright.parts.iris_scan import _circle, _colors, _opening
+from facewright.parts.iris import PATTERNS, WHITE, EyeLook, eye_colors
+from facewright.parts.iris_scan import Iris, _circle, _colors, _opening
 
 COLOR = (0.06, 0.10, 0.15)
 
@@ -65,3 +65,20 @@ def test_the_iris_of_a_painted_plane_is_found():
     center, radius, contrast = _circle(points[room > 1], light[room > 1], np.zeros(2))
     np.testing.assert_allclose(center, middle, atol=0.3)
     assert 5.3 < radius < 6.4 and contrast > 0.5
+
+
+def seen(color, white):
+    return Iris(np.zeros(2), 6.0, np.array(color), 0.5, np.array(white))
+
+
+def test_an_eye_in_the_light_keeps_its_color():
+    iris = seen((0.10, 0.12, 0.14), WHITE)
+    assert iris.light == 1.0 and np.array_equal(iris.lit_color, iris.color)
+
+
+@pytest.mark.parametrize("cast", [(0.05, 0.05, 0.05), (0.08, 0.06, 0.03)])
+def test_the_white_tells_what_light_the_iris_lacks(cast):
+    true, shade = np.array([0.10, 0.12, 0.14]), np.array(cast)
+    iris = seen(shade * true, shade * WHITE)
+    assert iris.light < 0.2
+    assert np.allclose(iris.lit_color / iris.lit_color.sum(), true / true.sum())
