@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
+from facewright.bake.fill import LUMA, feather, hair_stains, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
 from facewright.bake.project import project_to_scan
 from facewright.bake.pyramid import push_pull
@@ -32,6 +32,7 @@ from facewright.mesh.tangents import corner_tangents, to_tangent_space
 
 SEEN, FILLED, INSIDE = 255, 128, 0
 HAIR_EDGE_MM = 6.0
+STRANDS_MM, STRAND_SHARE = 15.0, 0.9  # beside hair, what has less than so much of the skin's brightness is a strand
 SPECK_MM = 6.0
 HAIR_TEXEL_MM = 2.0  # hair's colour is that of a lock, not of a strand
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
@@ -93,6 +94,9 @@ def bake(scan, face, options=None, jobs=1):
     share = np.where(stains, 0.0, share)
     default = _default_skin(face.template)
     fill = solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, share, default)
+    beside = surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM
+    beside &= ~regions.get("face", np.zeros(n, bool))  # brows are strands too
+    colored &= ~_strands(skin, texels, colors, beside, fill, jobs)
 
     albedo = _compose_albedo(face.template, skin, texels, colors, colored, fill, jobs)
     normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
@@ -189,6 +193,22 @@ def _look(scan, skin, texels, hits, size, jobs):
 
     in_chunks(work, len(seen), jobs)
     return colors, colored, bends, met
+
+
+def _strands(skin, texels, colors, beside, fill, jobs):
+    """(k,) bool: texels of vertices beside hair (n,) that are much darker than the skin there: single strands of it,
+    which the colours of vertices do not tell."""
+    share = beside.astype(np.float32)
+
+    def work(piece):
+        face, barycentric = texels.face[piece], texels.barycentric[piece]
+        odd = np.zeros(len(face), bool)
+        at = np.flatnonzero(at_points(share, skin.F, face, barycentric) > 0)
+        usual = at_points(fill.color, skin.F, face[at], barycentric[at]) @ LUMA
+        odd[at] = colors[piece][at] @ LUMA < STRAND_SHARE * usual
+        return odd
+
+    return _joined(in_chunks(work, len(texels), jobs), (0,), bool)
 
 
 def _compose_albedo(template, skin, texels, colors, colored, fill, jobs):

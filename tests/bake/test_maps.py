@@ -109,6 +109,24 @@ def test_what_the_fit_does_not_follow_is_not_read(ball_face, ball_scan, texels):
     assert (at(maps, "coverage", texels)[high, 0] == FILLED).all()
 
 
+def test_strands_beside_hair_are_not_read_but_brows_are(ball_face, ball_scan, texels):
+    def strand(directions):
+        return (np.abs(directions[:, 0]) < 0.012) & (directions[:, 1] > 0.30)
+
+    def hair_on_skin(directions):
+        return np.where((strand(directions) | (directions[:, 1] > 0.5))[:, None], 0.15, [[0.7, 0.5, 0.4]])
+
+    high = ball_face.template.vertices[:, 1] > 40
+    regions = ball_face.regions | {"hidden": high}
+    face = Face(**{**vars(ball_face), "observed": ~high, "regions": regions})
+    maps = bake(ball_scan(hair_on_skin), face, SIZE)
+    directions = directions_of(texels, ball_face)
+    beside = strand(directions) & (directions[:, 1] > 0.34) & (directions[:, 1] < 0.40)
+    light = at(maps, "albedo", texels)[:, 0] / (255 * 0.7)
+    assert light[beside & (directions[:, 2] < 0.2)].min() > 0.8
+    assert light[beside & (directions[:, 2] > 0.3)].min() < 0.6, "in the face it may be a brow"
+
+
 def test_a_scan_without_colour_gives_the_materials(ball_face, ball_scan, texels):
     maps = bake(ball_scan(None), ball_face, SIZE)
     seen = at(maps, "coverage", texels)[:, 0] == SEEN
