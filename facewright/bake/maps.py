@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from facewright.bake.fill import LUMA, feather, hair_stains, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
@@ -32,7 +33,12 @@ from facewright.mesh.tangents import corner_tangents, to_tangent_space
 
 SEEN, FILLED, INSIDE = 255, 128, 0
 HAIR_EDGE_MM = 6.0
-STRANDS_MM, STRAND_SHARE = 15.0, 0.9  # beside hair, what has less than so much of the skin's brightness is a strand
+STRANDS_MM, STRAND_SHARE, STRAND_ROUNDS = (
+    15.0,
+    0.9,
+    2,
+)  # beside hair, what has less than so much of the skin's brightness is a strand
+BROWS_MM = 32.0  # from eyes, lips and nostrils
 SPECK_MM = 6.0
 HAIR_TEXEL_MM = 2.0  # hair's colour is that of a lock, not of a strand
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
@@ -87,16 +93,7 @@ def bake(scan, face, options=None, jobs=1):
     geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
     geometry_weight = feather(skin.V, skin.F, skin.outer, geometry_share)
     has_color = bool(colored.any())
-    means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, len(skin.V), jobs)
-    n = len(skin.V)
-    regions = {name: mask[:n] for name, mask in face.regions.items()}
-    stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin))
-    share = np.where(stains, 0.0, share)
-    default = _default_skin(face.template)
-    fill = solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, share, default)
-    beside = surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM
-    beside &= ~regions.get("face", np.zeros(n, bool))  # brows are strands too
-    colored &= ~_strands(skin, texels, colors, beside, fill, jobs)
+    colored, fill = _filled(scan, face, skin, texels, colors, colored, can_see, jobs)
 
     albedo = _compose_albedo(face.template, skin, texels, colors, colored, fill, jobs)
     normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
@@ -193,6 +190,40 @@ def _look(scan, skin, texels, hits, size, jobs):
 
     in_chunks(work, len(seen), jobs)
     return colors, colored, bends, met
+
+
+def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
+    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, and the Fill for the others."""
+    n = len(skin.V)
+    regions = {name: mask[:n] for name, mask in face.regions.items()}
+    means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
+    stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin))
+
+    def solved():
+        known, default = np.where(stains, 0.0, share), _default_skin(face.template)
+        return solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, known, default)
+
+    fill = solved()
+    beside = surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM
+    beside &= ~_bearded(skin.neutral, regions)
+    for _ in range(STRAND_ROUNDS):  # what strands have darkened hides others
+        strands = colored & _strands(skin, texels, colors, beside, fill, jobs)
+        if not strands.any():
+            break
+        colored = colored & ~strands
+        means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
+        fill = solved()
+    return colored, fill
+
+
+def _bearded(V, regions):
+    """(n,) bool of a neutral (n, 3): where brows, lashes and beards grow, which stay."""
+    none = np.zeros(len(V), bool)
+    features = np.any([regions.get(name, none) for name in ("eyes", "lips", "nostrils")], axis=0)
+    if not features.any():
+        return regions.get("face", none)
+    near = cKDTree(V[features]).query(V)[0] < BROWS_MM
+    return regions["face"] & (near | (V[:, 1] < V[regions["eyes"], 1].mean()))
 
 
 def _strands(skin, texels, colors, beside, fill, jobs):
