@@ -21,6 +21,9 @@ WEAK_MM = 2.0
 # Where lips meet, one overhangs the other, and the middle of the wide valley lies up to 0.5 mm beside the line itself.
 # A narrow valley this deep (mm: from here on believed, and wholly) says where that is.
 SLIT_MM = (0.5, 1.0)
+# A crease that a scanner has filled has a flat bottom, and either edge of it is a narrow valley: the path would change
+# from one to the other. There the middle of the wide valley has less than SHARP of what they have, and is asked for.
+FLAT_WIDTH_MM, FLAT_REACH_MM, SHARP, BLUR_MM = 2.2, 1.6, 0.75, 1.0
 SLIT_WIDTH_MM, SLIT_REACH_MM, SLIT_STEP_MM, SLIT_SIGMA_MM = 0.6, 1.0, 0.05, 0.6
 
 
@@ -79,6 +82,8 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     strength = _valley_strength(depth, offsets, options)
     evidence = np.minimum(strength / DEEP_MM, 2.0) + np.minimum(_dark_strength(dark, options) / DARK, 1.0)
     inside = np.abs(offsets) <= options.half_band_mm
+    if _is_flat(depth, offsets, inside, options):
+        evidence = gaussian_filter1d(evidence, BLUR_MM / options.step_mm, axis=1)
     path = best_path(evidence[:, inside], offsets[inside], options)
     rows = np.flatnonzero(inside)[path]
     along = np.arange(len(columns))
@@ -139,6 +144,18 @@ def _valley_strength(depth, offsets, options):
     step = offsets[1] - offsets[0]
     levels = [0.5 * _second_difference(smooth, width, step) for width in options.widths_mm]
     return np.maximum(np.mean(levels, axis=0), 0.0)
+
+
+def _is_flat(depth, offsets, inside, options):
+    """Whether the bottom of the valley is flat: narrow valleys lie beside the middle of the wide one, not in it."""
+    smooth = gaussian_filter1d(depth, 0.3 / options.step_mm, axis=0)
+    narrow = np.maximum(_second_difference(smooth, min(options.widths_mm), options.step_mm), 0.0)[:, inside]
+    wide = np.maximum(_second_difference(smooth, FLAT_WIDTH_MM, options.step_mm), 0.0)[:, inside]
+    path = best_path(wide, offsets[inside], options)
+    off = np.abs(offsets[inside][None] - offsets[inside][path][:, None])
+    at, around = (np.where(off <= reach, narrow, 0.0).max(axis=1) for reach in (1.1 * options.step_mm, FLAT_REACH_MM))
+    core = slice(len(path) // 4, -(len(path) // 4))  # lips run into the corners as they like
+    return np.median(at[core] / np.maximum(around[core], 1e-9)) < SHARP
 
 
 def _dark_strength(dark, options):
