@@ -2,7 +2,7 @@
 
     python bench/clay_eyes.py [--templates hm08 ict] [--seeds 0 1 2] [--faces 3000] [--noise 0.3]
 
-Every head is made in one template and fitted with the others, with eyes open and shut. Heads can be decimated and noisy.
+Every head is made in one template and fitted with the others, with eyes open and shut. It can be decimated and noisy.
 """
 
 from __future__ import annotations
