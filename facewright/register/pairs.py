@@ -45,8 +45,9 @@ class Pairs:
     rest: np.ndarray
     by_hand: np.ndarray
 
-    def where(self, keep):
-        """Those of them that keep (l,) bool says."""
+    def without(self, names):
+        """All but those of these names, which stay if a person placed them."""
+        keep = self.by_hand | ~np.isin(self.names, list(names))
         names = tuple(name for name, kept in zip(self.names, keep) if kept)
         arrays = {name: getattr(self, name)[keep] for name in ("points", "rows", "weights", "rest", "by_hand")}
         return Pairs(names, **arrays)
@@ -117,7 +118,7 @@ def on_lid_borders(pairs, borders):
             if border is None:
                 continue
             x, *rest = border.points.T
-            rows = np.array([index[f"mp{number}"] for number in numbers[1:-1]])
+            rows = np.array([index[f"mp{number}"] for number in numbers[1:-1] if f"mp{number}" in index], np.int64)
             rows = rows[(points[rows, 0] > x[0]) & (points[rows, 0] < x[-1])]
             for axis, values in zip((1, 2), rest):
                 points[rows, axis] = np.interp(points[rows, 0], x, values)
@@ -159,14 +160,8 @@ def lid_gaps(pairs):
 
 
 def lid_names(side):
-    """Names of the landmarks on both lids of a side, corners apart."""
-    return {f"mp{number}" for lid in LIDS[side] for number in lid[1:-1]}
-
-
-def without_lids(pairs):
-    """Pairs without the landmarks of the lids, unless a person placed them."""
-    lids = [*lid_names("left"), *lid_names("right")]
-    return pairs.where(pairs.by_hand | ~np.isin(pairs.names, lids))
+    """Names of the landmarks on the upper and on the lower lid of a side, corners apart."""
+    return tuple({f"mp{number}" for number in lid[1:-1]} for lid in LIDS[side])
 
 
 def landmark_errors(pairs, fit):
