@@ -13,6 +13,7 @@ ORDER = (
     "registration_truth",
     "real_scans",
     "invariance",
+    "clay_eyes",
     "job",
     "iris",
     "compression",

@@ -29,7 +29,7 @@ SLACK_MM, LANDMARK_WEIGHT, CANTHUS_WEIGHT = 1.5, 5.0, 15.0
 def leading_lines(scan, template, model, pairs, closed, borders):
     """The rows that lead the skin to feature lines found on the scan, and what to report.
 
-    borders dict side -> (upper, lower) lids.Border of open eyes, where the scan's colours show them
+    borders dict side -> (upper, lower) lids.Border of open eyes, None where neither colours nor relief show one
     """
     stop = template.skin.vertices[1]
     normals = vertex_normals(model.vertices[:stop], template.faces[template.skin.face_slice])
@@ -54,6 +54,8 @@ def leading_lines(scan, template, model, pairs, closed, borders):
                 led |= set(EYES[side])
     for side, lids in borders.items():
         for border, which, numbers in zip(lids, ("upper", "lower"), LIDS[side]):
+            if border is None:
+                continue
             line = template.lines[f"lid_{which}_{side}"]
             leading.append(border_rows(line, border, BORDER_WEIGHT, BORDER_SLACK_MM, stop))
             led |= set(numbers[1:-1])

@@ -83,9 +83,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     information = options.n_effective / options.sigma_mm**2
     landmark_model = _project(landmark_rows, mean, coarse, deltas)
     linear = np.concatenate([coarse.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
-    for _ in range(8):
-        rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
-        state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
+    _follow(state, landmark_model, landmark_points, landmark_weights, options)
     for iteration in range(options.iterations):
         if iteration == options.iterations - options.fine_iterations:
             areas *= ~doubt(state.vertices())[sampled]
@@ -112,8 +110,24 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     vertices = state.vertices()
     matches = target.match(vertices[sampled], vertex_normals(vertices, faces)[sampled], max_distance=6.0)
     rms = float(np.sqrt(np.average(matches.distance**2, weights=areas * matches.weights + 1e-12)))
-    rest = vertices - np.tensordot(state.expression, deltas, 1) @ (state.s * state.R.T)
-    return ModelFit(vertices, rest, state.alpha, state.expression, state.T(), rms)
+    return ModelFit(vertices, state.rest(vertices), state.alpha, state.expression, state.T(), rms)
+
+
+def fit_landmarks(mean, basis, expressions, landmarks, options):
+    """As fit_model, but by the landmarks alone, which takes a tenth of a second; rms is theirs."""
+    points, matrix, weights = landmarks
+    state = _State(mean, basis, expressions)
+    _follow(state, _project(matrix, mean, basis, expressions.deltas), points, weights, options)
+    vertices = state.vertices()
+    rms = float(np.sqrt(np.mean(np.sum((matrix @ vertices - points) ** 2, axis=1))))
+    return ModelFit(vertices, state.rest(vertices), state.alpha, state.expression, state.T(), rms)
+
+
+def _follow(state, landmark_model, points, weights, options):
+    """Let the landmarks lead the state to where they find it."""
+    for _ in range(8):
+        rows, residuals, row_weights = _landmark_rows(state, landmark_model, points, weights)
+        state.step([(rows, residuals, row_weights / options.landmark_sigma_mm**2)])
 
 
 def sample_rows(weights, count):
@@ -170,6 +184,10 @@ class _State:
 
     def vertices(self):
         return self.placed(self.mean + self.basis.along(self.alpha), self.expressions)
+
+    def rest(self, vertices):
+        """The person's vertices (n, 3) with the expressions taken off."""
+        return vertices - np.tensordot(self.expression, self.expressions, 1) @ (self.s * self.R.T)
 
     def jacobian(self, mean, basis, expressions):
         """(k, 3, p): columns are identity, expression, rotation (3), log scale, translation (3)."""
