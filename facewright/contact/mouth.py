@@ -58,7 +58,8 @@ class MouthOptions:
     tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
     tongue_half  shares of its whole way by which the mouth is parted and the tongue has come at half: first it opens
     once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
-    halves       shapes that get an in-between at half
+    halves       shapes that get an in-between at half: lips rolled in, which pass round the teeth
+    pressed      share of itself by which such a shape goes on from where outer skin of a lip meets the teeth
     pairs        shapes, or both sides of them, that get a corrective together
     """
 
@@ -71,6 +72,7 @@ class MouthOptions:
     once_share: float = 0.6
     window_mm: float = 44.0
     halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
+    pressed: float = 0.5
     pairs: tuple[tuple[str, str], ...] = PAIRS
 
 
@@ -92,7 +94,7 @@ def solve_mouth(face, targets, options=None, jobs=1):
     jobs  threads; the result does not depend on them
     """
     mouth = _Mouth(face, options or MouthOptions(), jobs)
-    result = mouth.with_arc(targets)
+    result = mouth.with_room(mouth.with_arc(targets))
     result = mouth.with_single_shapes(mouth.with_flat_corners(result))
     result = mouth.with_both_sides(result)
     result = mouth.with_halves(result)
@@ -130,6 +132,18 @@ class _Mouth:
         half = in_between_name("jawOpen", HALF)
         extras = targets.extras | {half: jaw.half_open(self.face.vertices, opened, HALF)}
         return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
+
+    def with_room(self, targets):
+        """Targets whose rolls are no stronger than the teeth leave room for.
+
+        What is drawn for lips alone takes thick ones several millimetres into the teeth. Pushed out of them the two
+        sides of a lip would change places.
+        """
+        deltas = np.array(targets.deltas)
+        for name in set(self.options.halves) & set(targets.names):
+            met = self.contact.meets_teeth(targets.delta(name), 1.0 - self.options.pressed)
+            deltas[targets.names.index(name)] *= min(1.0, met + self.options.pressed)
+        return replace(targets, deltas=deltas)
 
     def with_single_shapes(self, targets):
         """Targets of which each by itself keeps the lips apart on its whole way."""
