@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.contact.bag import MouthBag
+from facewright.contact.bag import NOSTRILS, MouthBag
 from facewright.contact.folds import SEAM_MOBILITY
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
@@ -220,13 +220,17 @@ class _Mouth:
         return replace(targets, extras=extras, correctives=correctives)
 
     def with_bag(self, targets):
-        """Targets of which none, and no pair, draws outer skin over the mouth's lining."""
+        """Targets of which none, and no pair, draws outer skin over the lining of the mouth or the nostrils."""
         regions, skin = self.face.regions, self.face.vertices[self.skin]
-        inner, outer = regions["mouth_interior"][self.skin], regions["outer"][self.skin]
-        bag = MouthBag(skin, self.faces, self.seams, inner, outer)
+        outer = regions["outer"][self.skin]
+        bags = [MouthBag(skin, self.faces, self.seams, regions["mouth_interior"][self.skin], outer)]
+        rims = [line for name, line in self.face.lines.items() if name.startswith("nostril")]
+        if rims and "nostrils" in regions:
+            bags.append(MouthBag(skin, self.faces, rims, regions["nostrils"][self.skin], outer, NOSTRILS))
 
         def tucked(pose):
-            return bag.tucked(skin + targets.motion(pose)[self.skin])
+            posed = skin + targets.motion(pose)[self.skin]
+            return sum(bag.tucked(posed) for bag in bags)
 
         poses = {name: {name: 1.0} for name in self._lip_shapes(targets)}
         if {"mouthClose", "jawOpen"} <= set(targets.names):
