@@ -27,6 +27,7 @@ from facewright.conventions import (
 from facewright.mesh.folds import laid_flat
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
+from facewright.transfer.within import region_shares
 
 HALF = 0.5
 _MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
@@ -149,6 +150,8 @@ class _Mouth:
         """Targets of which each by itself keeps the lips apart on its whole way."""
         names = self._lip_shapes(targets)
         lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
+        for lack, share in zip(lacks, region_shares(self.face, names)):
+            lack[self.skin] *= share  # lips that are shut on one side pull at the other corner
         return _added(targets, [(lack, {name: 1.0}) for name, lack in zip(names, lacks)])
 
     def with_both_sides(self, targets):
