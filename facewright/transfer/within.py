@@ -26,8 +26,10 @@ def keep_within_regions(face, deltas):
 
 
 def region_shares(face, names):
-    """For each shape that is named (n_skin, 1) in 0..1, how much of it the skin of a data.Face may show: 1 inside of its
-    region and in what is not seen, fading to 0 at its border; 1.0 for what the working set does not know."""
+    """For each shape that is named (n_skin, 1) in 0..1, how much of it the skin of a data.Face may show.
+
+    1 inside of its region and in what is not seen, fading to 0 at its border; 1.0 for a name the working set lacks.
+    """
     words = read_working_set()
     skin = face.template.skin.vertex_slice
     outer = face.regions["outer"][skin]
