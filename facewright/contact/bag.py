@@ -31,6 +31,9 @@ class BagOptions:
     rounds: int = 6
 
 
+NOSTRILS = BagOptions(lip_mm=(0.5, 3.0), face_mm=(0.0, 30.0))
+"""Nostrils follow the tip of the nose, and its wings may stay."""
+
 _NOTHING_MM, _LEAST_SHARE = 0.01, 0.1
 _SAMPLES = np.array([[i, j, 3 - i - j] for i in range(4) for j in range(4 - i)]) / 3.0  # barycentric
 

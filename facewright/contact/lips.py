@@ -30,6 +30,7 @@ _MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
 _PIN = 100.0  # weight of a push against 1 mm2 of bending
 _NOTHING_MM = 1e-4
 _TRUSTED_MM = 1.0  # of a clearance: a lip ends, and farther off a vertex gets behind it without passing through it
+_STEPS = np.linspace(0.2, 1.0, 5)  # of a way on which teeth are looked for
 _LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
 _LEAST_SLOPE = 0.1  # of the lips' lines towards each other at a corner: there they are as near as they are to it
 
@@ -95,6 +96,7 @@ class LipContact:
         lines = [place[line] for line in seams]
         self._pairs, self._ends = [line[1:-1] for line in lines], lines[0][[0, -1]]
         self._both = np.concatenate(self.sides)
+        self._skins = self._both[outer[self.used[self._both]]]
         self._about_lips = self.faces[np.isin(self.faces, self._both).any(axis=1)]  # what their normals depend on
         self.lips = self.used[self._both]
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
@@ -185,6 +187,19 @@ class LipContact:
             if not asked:
                 break
         return self._of_head(best)
+
+    def meets_teeth(self, motion, most):
+        """Weight in 0..most at which outer skin of the lips first meets the teeth on the straight way of a motion
+        (n, 3); most where it does not."""
+        before = last = 0.0
+        for weight in most * _STEPS:
+            pose = self.V + weight * motion
+            skin = pose[self.used[self._skins]]
+            depth = max((lengths(row.way_out(skin, pose[at])[0]).max() for at, row in self.teeth), default=0.0)
+            if depth > self.options.touch_mm:
+                return last + (weight - last) * max(self.options.touch_mm - before, 0.0) / (depth - before)
+            before, last = depth, weight
+        return most
 
     def lifted(self, motion, forward):
         """(n, 3) correction of a motion (n, 3) that leaves rest_mm between the lines of lips that touch.

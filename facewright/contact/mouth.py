@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.contact.bag import MouthBag
+from facewright.contact.bag import NOSTRILS, MouthBag
 from facewright.contact.folds import SEAM_MOBILITY
 from facewright.contact.jaw import find_jaw
 from facewright.contact.lips import LipContact, LipOptions
@@ -27,6 +27,7 @@ from facewright.conventions import (
 from facewright.mesh.folds import laid_flat
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
+from facewright.transfer.within import region_shares
 
 HALF = 0.5
 _MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
@@ -58,7 +59,8 @@ class MouthOptions:
     tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
     tongue_half  shares of its whole way by which the mouth is parted and the tongue has come at half: first it opens
     once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
-    halves       shapes that get an in-between at half
+    halves       shapes that get an in-between at half: lips rolled in, which pass round the teeth
+    pressed      share of itself by which such a shape goes on from where outer skin of a lip meets the teeth
     pairs        shapes, or both sides of them, that get a corrective together
     """
 
@@ -71,6 +73,7 @@ class MouthOptions:
     once_share: float = 0.6
     window_mm: float = 44.0
     halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
+    pressed: float = 0.5
     pairs: tuple[tuple[str, str], ...] = PAIRS
 
 
@@ -92,7 +95,7 @@ def solve_mouth(face, targets, options=None, jobs=1):
     jobs  threads; the result does not depend on them
     """
     mouth = _Mouth(face, options or MouthOptions(), jobs)
-    result = mouth.with_arc(targets)
+    result = mouth.with_room(mouth.with_arc(targets))
     result = mouth.with_single_shapes(mouth.with_flat_corners(result))
     result = mouth.with_both_sides(result)
     result = mouth.with_halves(result)
@@ -131,10 +134,24 @@ class _Mouth:
         extras = targets.extras | {half: jaw.half_open(self.face.vertices, opened, HALF)}
         return replace(targets, extras=extras, in_betweens=targets.in_betweens | {"jawOpen": {HALF: half}})
 
+    def with_room(self, targets):
+        """Targets whose rolls are no stronger than the teeth leave room for.
+
+        What is drawn for lips alone takes thick ones several millimetres into the teeth. Pushed out of them the two
+        sides of a lip would change places.
+        """
+        deltas = np.array(targets.deltas)
+        for name in set(self.options.halves) & set(targets.names):
+            met = self.contact.meets_teeth(targets.delta(name), 1.0 - self.options.pressed)
+            deltas[targets.names.index(name)] *= min(1.0, met + self.options.pressed)
+        return replace(targets, deltas=deltas)
+
     def with_single_shapes(self, targets):
         """Targets of which each by itself keeps the lips apart on its whole way."""
         names = self._lip_shapes(targets)
         lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
+        for lack, share in zip(lacks, region_shares(self.face, names)):
+            lack[self.skin] *= share  # lips that are shut on one side pull at the other corner
         return _added(targets, [(lack, {name: 1.0}) for name, lack in zip(names, lacks)])
 
     def with_both_sides(self, targets):
@@ -206,13 +223,17 @@ class _Mouth:
         return replace(targets, extras=extras, correctives=correctives)
 
     def with_bag(self, targets):
-        """Targets of which none, and no pair, draws outer skin over the mouth's lining."""
+        """Targets of which none, and no pair, draws outer skin over the lining of the mouth or the nostrils."""
         regions, skin = self.face.regions, self.face.vertices[self.skin]
-        inner, outer = regions["mouth_interior"][self.skin], regions["outer"][self.skin]
-        bag = MouthBag(skin, self.faces, self.seams, inner, outer)
+        outer = regions["outer"][self.skin]
+        bags = [MouthBag(skin, self.faces, self.seams, regions["mouth_interior"][self.skin], outer)]
+        rims = [line for name, line in self.face.lines.items() if name.startswith("nostril")]
+        if rims and "nostrils" in regions:
+            bags.append(MouthBag(skin, self.faces, rims, regions["nostrils"][self.skin], outer, NOSTRILS))
 
         def tucked(pose):
-            return bag.tucked(skin + targets.motion(pose)[self.skin])
+            posed = skin + targets.motion(pose)[self.skin]
+            return sum(bag.tucked(posed) for bag in bags)
 
         poses = {name: {name: 1.0} for name in self._lip_shapes(targets)}
         if {"mouthClose", "jawOpen"} <= set(targets.names):

@@ -25,7 +25,7 @@ class Teeth:
         self.vertices, self.faces = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
         self._low, self._high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         outer = self.faces[_outer_side(self.vertices, self.faces)]
-        self._outside, self._normals = Surface(self.vertices, outer), face_normals(self.vertices, outer)
+        self._outside = Surface(self.vertices, outer)
         self._surface = Surface(self.vertices, self.faces)
         self._surface_normals = face_normals(self.vertices, self.faces)
         self._tree = igl.FastWindingNumberBVH()
@@ -51,9 +51,8 @@ class Teeth:
             clearance[near] = self._before_all(back[near])
             near = near[clearance[near] == 0.0]
             near = near[self._winding(back[near]) > 0.5]
-            points, faces, distance = self._outside.nearest(back[near])
-            way = points - back[near]
-            out = (dot(way, self._normals[faces]) > 0) & (distance < _MOST_MM)
+            points, _, distance = self._outside.nearest(back[near])
+            way, out = points - back[near], distance < _MOST_MM
             result[near[out]] = way[out] @ A.T
         return result, clearance * _least_stretch(A)
 

@@ -19,23 +19,33 @@ def keep_within_regions(face, deltas):
     Transfer spreads a little of every shape over the whole head: tenths of a millimetre that an animator sees as a
     forehead that breathes with the mouth. Names that the working set does not know are left alone.
     """
+    result = np.array(deltas)
+    for delta, share in zip(result, region_shares(face, face.template.shape_names)):
+        delta[face.template.skin.vertex_slice] *= share
+    return result
+
+
+def region_shares(face, names):
+    """For each shape that is named (n_skin, 1) in 0..1, how much of it the skin of a data.Face may show.
+
+    1 inside of its region and in what is not seen, fading to 0 at its border; 1.0 for a name the working set lacks.
+    """
     words = read_working_set()
     skin = face.template.skin.vertex_slice
     outer = face.regions["outer"][skin]
     scale = scale_of(face)
-    result = np.array(deltas)
     fades = {}
-    for i, name in enumerate(face.template.shape_names):
+    for name in names:
         word = words.words.get(name)
         if word is None:
+            yield 1.0
             continue
         key = word.region, word.side
         if key not in fades:
             depth = region_depth(face.vertices[skin], face.lines, words.regions[word.region], word.side, scale)
             share = np.clip(depth / FADE_MM, 0.0, 1.0)
             fades[key] = np.where(outer, share * share * (3 - 2 * share), 1.0)[:, None]
-        result[i, skin] *= fades[key]
-    return result
+        yield fades[key]
 
 
 def keep_within_amplitudes(face, deltas):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from facewright.contact import Targets, find_jaw, part_lips, solve_mouth
-from facewright.contact.mouth import MouthOptions
+from facewright.contact.mouth import MouthOptions, _Mouth
 from facewright.evaluate.mouth import measure_mouth
 from facewright.evaluate.quality import lip_gaps_mm
 from facewright.parts import build_rig, fit_parts
@@ -117,3 +117,16 @@ def test_lips_that_touch_are_parted_a_little(hm08, hm08_person):
     corner = np.linalg.norm(touching[upper][:, None] - touching[upper[[0, -1]]], axis=2).min(axis=1)
     assert np.abs(gap[corner > 2.0] - 0.1).max() < 0.03
     assert np.abs(parted - touching).max() < 0.1
+
+
+def test_a_roll_stops_where_the_teeth_stop_it(solved):
+    person, _, _ = solved
+    mouth = _Mouth(person, MouthOptions())
+    back = np.zeros_like(person.vertices)
+    back[mouth.contact.lips, 2] = -10.0
+    met = mouth.contact.meets_teeth(back, 1.0)
+    assert 0.0 < met < 1.0
+    assert np.isclose(mouth.contact.meets_teeth(0.8 * back, 1.0), met / 0.8, atol=0.05)
+    rolls = Targets(("mouthRollLower",), back[None])
+    assert np.allclose(mouth.with_room(rolls).deltas[0], min(1.0, mouth.contact.meets_teeth(back, 0.5) + 0.5) * back)
+    assert np.array_equal(mouth.with_room(Targets(("mouthRollLower",), 0.1 * back[None])).deltas[0], 0.1 * back)

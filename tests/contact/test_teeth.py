@@ -1,9 +1,10 @@
 """A row of teeth as a solid: what is inside leaves on the outer side, whatever pose the row is in."""
 
+import igl
 import numpy as np
 import pytest
 
-from facewright.contact.teeth import Teeth
+from facewright.contact.teeth import Teeth, rows_of_teeth
 from facewright.solve.procrustes import best_rotation
 
 
@@ -48,6 +49,18 @@ def test_a_turned_row_answers_the_same(row):
     way, _ = row.way_out(points, row.vertices)
     turned, _ = row.way_out(points @ R.T + shift, row.vertices @ R.T + shift)
     assert way.any() and np.abs(turned - way @ R.T).max() < 1e-9
+
+
+def test_what_is_inside_has_a_way_out_and_nothing_else(hm08):
+    rng = np.random.default_rng(1)
+    for place, row in rows_of_teeth(hm08, hm08.vertices):
+        V = hm08.vertices[place]
+        points = rng.uniform(V.min(axis=0), V.max(axis=0), (4000, 3))
+        inside = igl.fast_winding_number(row.vertices, row.faces, points) > 0.5
+        way, _ = row.way_out(points, V)
+        leaves = way.any(axis=1)
+        assert not leaves[~inside].any()
+        assert leaves[inside].mean() > 0.95  # the rest lies where two teeth of the row stand in each other
 
 
 def test_a_strip_is_no_solid():
