@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.contact.watch import Watch
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import dot, lengths, vertex_normals
@@ -57,22 +56,32 @@ class MouthBag:
         mine = faces[inner[faces].all(axis=1) & (self.free[faces] > 0.0).any(axis=1)]
         self.corners = np.repeat(mine, len(_SAMPLES), axis=0)
         self.shares = np.tile(_SAMPLES, (len(mine), 1))
-        self._place = _same_place(self.corners, self.shares)
+        self._index_places()
         self._rim = border_vertices(self.patch, len(vertices))
         before = self.before(vertices)
         depth = np.nan_to_num(-self.heights(before, vertices, np.arange(len(self.corners)))[0], posinf=0.0)
         near = (depth > self.options.least_mm) & (depth < self.options.most_mm)
         self.corners, self.shares = self.corners[near], self.shares[near]
-        self._place = _same_place(self.corners, self.shares)
+        self._index_places()
         self._wanted = np.clip(0.5 * depth[near], 0.0, self.options.flesh_mm)
-        self._surface, every = np.unique(self.patch), np.arange(len(self.corners))
-        rest = self._samples(vertices, every), vertices[self._surface]
-        self._at_rest = Watch(*rest, np.maximum(depth[near] - self._wanted, 0.0))
+        # Lining that goes with the skin before it stays behind it.
+        found = before.closest(self._samples(vertices, np.arange(len(self.corners))))
+        self._before, self._before_shares = self.patch[found.faces], found.barycentric
+        self._room, self._at_rest = depth[near] - self._wanted, self._behind(vertices)
+
+    def _index_places(self):
+        """Samples on edges and corners lie in several faces, and are asked about once."""
+        self._place = _same_place(self.corners, self.shares)
+        self._first = np.unique(self._place, return_index=True)[1]
+        self._vertices, corner = np.unique(self.corners, return_inverse=True)
+        self._corner = corner.reshape(-1, 3)
 
     def tucked(self, skin):
         """(n, 3) displacement that brings the lining of a pose (n, 3) back behind the outer skin."""
         moved, every = np.array(skin), np.arange(len(self.corners))
-        asked = self._at_rest.at(self._samples(skin, every), skin[self._surface]).due()
+        asked = np.flatnonzero(lengths(self._behind(skin) - self._at_rest) > self._room)
+        if not len(asked):
+            return np.zeros_like(skin)
         before = self.before(skin)  # which does not give way
         asked = asked[self._may_come_out(before, skin, asked)]
         for _ in range(self.options.rounds):
@@ -91,9 +100,13 @@ class MouthBag:
             moved += total / np.maximum(count, 1e-9)[:, None]
         return moved - skin
 
+    def _behind(self, skin):
+        """(k, 3) from the skin that lies before each sample at rest to the sample, in a pose (n, 3)."""
+        return _points(skin, self.corners, self.shares) - _points(skin, self._before, self._before_shares)
+
     def _samples(self, skin, index):
         """(k, 3) points of the lining that are asked about."""
-        return np.einsum("kc,kcd->kd", self.shares[index], skin[self.corners[index]])
+        return _points(skin, self.corners[index], self.shares[index])
 
     def before(self, skin):
         """The outer skin of a pose (n, 3) that lining could come out of."""
@@ -101,15 +114,15 @@ class MouthBag:
 
     def heights(self, before, skin, index):
         """(k,) how far samples of the lining lie outside of the nearest outer skin, and its normals (k, 3)."""
-        _, first, again = np.unique(self._place[index], return_index=True, return_inverse=True)
-        height, normal, _ = before.heights(self._samples(skin, index[first]))
+        asked, again = _each_once(self._place[index], len(self._first))
+        height, normal, _ = before.heights(self._samples(skin, self._first[asked]))
         return height[again], normal[again]
 
     def _may_come_out(self, before, skin, index):
         """(k,) bool of samples: a corner of their face may be too near to the outer skin to vouch for them."""
-        vertices, place = np.unique(self.corners[index], return_inverse=True)
-        height, _, distance = before.heights(skin[vertices])
-        depth = np.where(height < 0.0, distance, 0.0)[place.reshape(-1, 3)]
+        asked, again = _each_once(self._corner[index], len(self._vertices))
+        height, _, distance = before.heights(skin[self._vertices[asked]])
+        depth = np.where(height < 0.0, distance, 0.0)[again]
         away = lengths(skin[self.corners[index]] - self._samples(skin, index)[:, None])
         return (depth - away).max(axis=1, initial=0.0) <= self._wanted[index]
 
@@ -122,14 +135,30 @@ class _Before:
         self._patch, self._rim = patch, rim
         self._surface, self._normals = Surface(skin, patch), vertex_normals(skin, around)
 
+    def closest(self, points):
+        """ClosestPoints of points (k, 3) on it."""
+        return self._surface.closest(points)
+
     def heights(self, points):
         """(k,) mm by which points (k, 3) lie outside of it, -inf past its rim, where no such skin lies before them; the
         normals (k, 3) there; and distances (k,)."""
-        found = self._surface.closest(points)
+        found = self.closest(points)
         normal = interpolate(self._normals, self._patch, found.faces, found.barycentric)
         height = dot(points - found.points, normal)
         beyond = (self._rim[self._patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
         return np.where(beyond, -np.inf, height), normal, found.distance
+
+
+def _points(vertices, corners, shares):
+    """(k, 3) points with shares (k, 3) of corners (k, 3)."""
+    return np.einsum("kc,kcd->kd", shares, vertices.take(corners, axis=0))
+
+
+def _each_once(numbers, count):
+    """(k,) which of so many numbers occur, and where those of an array lie among them: a quick np.unique."""
+    occurs = np.zeros(count, bool)
+    occurs[numbers] = True
+    return np.flatnonzero(occurs), (np.cumsum(occurs) - 1)[numbers]
 
 
 def _same_place(corners, shares):
