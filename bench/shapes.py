@@ -30,7 +30,7 @@ from facewright.evaluate.synthetic import random_identity
 from facewright.packing import pack_face, unpack_face
 from facewright.read import read_scan
 from facewright.register import register
-from facewright.rigging import in_place, rig_from_face, template_rig, unscanned_face
+from facewright.rigging import assembled, in_place, shapes_of, template_rig, unscanned_face
 from facewright.sample import sample_path
 from facewright.scan import clean_scan, find_landmarks
 from facewright.transfer import transfer_shapes
@@ -68,9 +68,9 @@ def rigged(face, seconds):
         start = time.process_time()
         transfer_shapes(face)
         seconds["transfer"], start = time.process_time() - start, time.process_time()
-        rig = rig_from_face(face)
+        targets = shapes_of(face)
         seconds["contact"] = time.process_time() - start - seconds["transfer"]
-    return rig
+        return assembled(face, targets)
 
 
 def heads(template, count, only, fresh):

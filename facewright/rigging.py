@@ -65,7 +65,6 @@ def assembled(face, targets, maps=None, options=None):
 def _with_riders(face, shapes):
     """The shapes with lashes and all else that rides on the lids as their final skin wants it."""
     names = [*face.template.shape_names, *shapes.extras]
-    deltas = np.concatenate([shapes.deltas, *(delta[None] for delta in shapes.extras.values())])
-    deltas = ride_on_lids(face, deltas, names, shapes.correctives)
+    deltas = ride_on_lids(face, [*shapes.deltas, *shapes.extras.values()], names, shapes.correctives)
     n = len(shapes.deltas)
     return replace(shapes, deltas=deltas[:n], extras=dict(zip(shapes.extras, deltas[n:])))

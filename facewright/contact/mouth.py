@@ -156,12 +156,12 @@ class _Mouth:
 
     def with_both_sides(self, targets):
         """Targets of which left and right together keep the lips apart too; each side gets its share."""
-        for name in self._lip_shapes(targets):
-            twin = mirrored_name(name)
-            if name.startswith("mouth") and name.endswith("Left") and name != "mouthLeft" and twin in targets.names:
-                shares = {name: self.left, twin: 1.0 - self.left}
-                targets = self._corrected(targets, {name: 1.0, twin: 1.0}, shares)
-        return targets
+        lefts = [name for name in self._lip_shapes(targets) if name.startswith("mouth") and name.endswith("Left")]
+        pairs = [(name, mirrored_name(name)) for name in lefts if name != "mouthLeft"]
+        pairs = [pair for pair in pairs if pair[1] in targets.names]
+        lacks = self._each(lambda pair: self._lack(targets, dict.fromkeys(pair, 1.0)), pairs)
+        shares = self.left, 1.0 - self.left
+        return _added(targets, [(lack, dict(zip(pair, shares))) for pair, lack in zip(pairs, lacks)])
 
     def with_flat_corners(self, targets):
         """Targets of which none folds the skin around the lips, as where both pull at the small faces of a corner."""

@@ -103,7 +103,8 @@ class LidRiders:
 def ride_on_lids(face, deltas, names, correctives=None):
     """Deltas (t, n, 3) of all targets of a Face with those of its lid parts made anew from the skin's and the eyes'.
 
-    names (t,); correctives as in data.Rig: such a target is what its pose lacks when the drivers are added up
+    deltas t of (n, 3), names (t,); correctives as in data.Rig: such a target is what its pose lacks when the drivers
+    are added up
     """
     result = np.array(deltas)
     for side in SIDES:
