@@ -37,7 +37,9 @@ LEAST_RELIEF_MM = 0.05
 ASIDE_MM, COST_PER_MM2 = (1.8, 3.0), 0.002
 # A lid's border is looked for again in this strip about it, this far; what its square costs.
 STRIP_BAND_MM, STRIP_MOST_MM, STRIP_MM, STRIP_REACH_MM, STRIP_COST = (0.4, 2.5), 1.0, 2.0, 1.5, 0.02
-# Then each corner, by what is so near, across and up; what a mm2 of that costs.
+# Then each corner by what is so near, this far across and up; what a mm2 of that costs. Of 35 eyes of made heads the
+# template's corners lay 1.17 mm off across the view where the whole eye agrees best, and 0.70 when looked for again;
+# what is 4.5 mm near: 0.78.
 CORNER_MM, CORNER_REACH_MM, CORNER_COST = 3.0, (2.4, 1.8), 0.02
 ENDS = 0.15  # of its width, what is left out at either end
 # How well both eyes together and the strip must agree, in sum, to be believed: of 312 lids of made heads, clean, noisy,
