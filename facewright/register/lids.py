@@ -53,10 +53,15 @@ class EyePicture:
 
 @dataclass(frozen=True)
 class Border:
-    """The border of a lid on the scan: points (k, 3) from the person's right to left; forward (3,) to the viewer."""
+    """The border of a lid on the scan: points (k, 3) from the person's right to left; forward (3,) to the viewer.
+
+    ends: which vertices of the template's margin lie beyond the border, at the corners, as places (e,) along it, and
+    where they belong across the view (e, 3); None where that is not known
+    """
 
     points: np.ndarray
     forward: np.ndarray
+    ends: tuple[np.ndarray, np.ndarray] | None = None
 
 
 def open_eyes(scan, pairs, closed):

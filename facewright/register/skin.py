@@ -148,6 +148,24 @@ def border_rows(line, border, weight, slack_mm, n):
     return rows
 
 
+def aside_rows(vertices, points, forward, weight, slack_mm, n):
+    """Function of the current vertices: Rows that draw vertices (k,) across a view to points (k, 3), by what is beyond.
+
+    forward (3,) to the viewer; slack_mm: how far beside them they may lie
+    """
+    matrix = sp.csr_matrix((np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), shape=(len(vertices), n))
+
+    def rows(current):
+        here = current[vertices]
+        gap = points - here
+        gap -= (gap @ forward)[:, None] * forward
+        length = np.maximum(np.linalg.norm(gap, axis=1), 1e-9)
+        share = np.clip(1.0 - slack_mm / length, 0.0, 1.0)
+        return [Rows(matrix, here + share[:, None] * gap, np.full(len(vertices), weight))]
+
+    return rows
+
+
 def _frames(curve):
     """forward (p, 3) and across (p, 3) at the points of a lines.Crease or lids.Border."""
     tangents = normalized(np.gradient(curve.points, axis=0))

@@ -53,6 +53,23 @@ def test_open_eyes_are_open_and_their_lids_are_found(hm08, weight):
         assert off_by_mm(hm08, truth, relief.borders, side) < 0.4
 
 
+def test_the_ends_of_lids_lead_from_the_eye_s_corners_to_the_border(hm08):
+    truth = person(hm08, seed=7)
+    for side, relief in lid_reliefs(clay(hm08, truth), hm08, standing_at(person(hm08) + ASIDE)).items():
+        for which, border in zip(("upper", "lower"), relief.borders):
+            line = hm08.lines[f"lid_{which}_{side}"]
+            places, points = border.ends
+            assert {0, len(line) - 1} <= set(places.tolist())
+            x = border.points[[0, -1], 0]
+            assert not ((points[:, 0] > x[0]) & (points[:, 0] < x[1])).any()
+            for end, beside in ((border.points[0], points[:, 0] < x[0]), (border.points[-1], points[:, 0] > x[1])):
+                nearest = points[beside][np.abs(points[beside, 0] - end[0]).argmin()]
+                assert np.abs(nearest[1] - end[1]) < np.abs(nearest[0] - end[0]) + 0.1
+            corners = np.isin(places, (0, len(line) - 1))
+            off = points[corners] - truth[line[places[corners]]]
+            assert np.linalg.norm(off[:, :2], axis=1).mean() < 0.5
+
+
 def test_lids_of_another_person_s_eyes_are_found(hm08):
     truth = person(hm08, seed=7)
     for side, relief in lid_reliefs(clay(hm08, truth), hm08, standing_at(person(hm08))).items():

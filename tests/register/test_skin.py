@@ -6,7 +6,7 @@ from facewright.mesh.normals import vertex_normals
 from facewright.register.correspond import Target
 from facewright.register.lids import Border
 from facewright.register.register import LEVELS
-from facewright.register.skin import border_rows, fit_skin, skin_rules
+from facewright.register.skin import aside_rows, border_rows, fit_skin, skin_rules
 
 
 def test_what_the_model_lacks_is_taken_up_along_the_normal(hm08):
@@ -37,3 +37,13 @@ def test_a_border_pulls_straight_across_and_only_by_what_is_beyond_its_slack():
     assert np.allclose(gap * rows.normals[:, 1], [0.0, -0.7, 0.4, gap[3] * rows.normals[3, 1]])
     assert np.allclose(np.abs(rows.normals[:, 1]), 1.0)
     assert rows.weights.tolist() == [12.0, 12.0, 12.0, 0.0]
+
+
+def test_vertices_are_led_aside_by_what_is_beyond_the_slack_and_never_in_depth():
+    forward = np.array([0.0, 0.0, 1.0])
+    vertices = np.array([[0.0, 0.0, 5.0], [9.0, 9.0, 9.0], [1.0, 1.0, 0.0]])
+    points = np.array([[0.0, 2.0, -4.0], [1.2, 1.0, 3.0]])
+    (rows,) = aside_rows(np.array([0, 2]), points, forward, 2.0, 0.5, 3)(vertices)
+    assert np.allclose(rows.matrix @ vertices, vertices[[0, 2]])
+    assert np.allclose(rows.targets, [[0.0, 1.5, 5.0], [1.0, 1.0, 0.0]])
+    assert rows.weights.tolist() == [2.0, 2.0]
