@@ -43,7 +43,8 @@ def paint_teeth(look, size=1024):
     color = color * (1 - 0.35 * _step(0.26, 0.10, t))[..., None]  # the gum's shade
     inner = _step(0.2, 0.36, np.abs(u - 0.5))  # the sides and what faces the tongue
     shade = (1 - 0.085 * np.maximum(column - 1, 0)) * (1 - 0.25 * inner) * (1 - 0.06 * (row > 1))
-    return _image(color * shade[..., None])
+    # Light that has come so deep has met red skin before.
+    return _image(color * shade[..., None] ** [0.88, 1.06, 1.14])
 
 
 def paint_gums(look, size=512):
