@@ -42,8 +42,8 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     """
     options = options or AssemblyOptions()
     seen = face.stats.get("parts", {})
-    if options.eyes is not None and options.eyes.iris_color is None and "eye_light" in seen:
-        options = replace(options, eyes=_as_seen(options.eyes, seen["iris_color"], seen["eye_light"]))
+    if options.eyes is not None and options.eyes.iris_color is None and "iris_color" in seen:
+        options = replace(options, eyes=_as_seen(options.eyes, seen["iris_color"], seen.get("eye_light", 1.0)))
     maps = maps or {}
     template = face.template
     words = read_working_set()
