@@ -33,11 +33,8 @@ from facewright.mesh.tangents import corner_tangents, to_tangent_space
 
 SEEN, FILLED, INSIDE = 255, 128, 0
 HAIR_EDGE_MM = 6.0
-STRANDS_MM, STRAND_SHARE, STRAND_ROUNDS = (
-    15.0,
-    0.9,
-    2,
-)  # beside hair, what has less than so much of the skin's brightness is a strand
+# Beside hair, what has less than so much of the skin's brightness is a strand.
+STRANDS_MM, STRAND_SHARE, STRAND_ROUNDS = 15.0, 0.9, 2
 BROWS_MM = 32.0  # from eyes, lips and nostrils
 SPECK_MM = 6.0
 HAIR_TEXEL_MM = 2.0  # hair's colour is that of a lock, not of a strand

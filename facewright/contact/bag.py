@@ -38,7 +38,7 @@ _SAMPLES = np.array([[i, j, 3 - i - j] for i in range(4) for j in range(4 - i)])
 
 
 class MouthBag:
-    """The lining of one mouth, asked at its vertices and within its faces, which are large.
+    """The lining of one mouth, or of nostrils, asked at its vertices and within its faces, which are large.
 
     vertices (n, 3) of the skin at rest, faces (m, 3); seams two lines; inner, outer (n,) bool: lining, and seen skin
     """

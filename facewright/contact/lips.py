@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from facewright.contact.shut import LipSlit
 from facewright.contact.watch import Watch
-from facewright.mesh.adjacency import border_vertices, touching
+from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import dot, lengths, max_norms, normalized, vertex_normals
@@ -289,9 +289,6 @@ class LipContact:
         if not len(due):
             none = np.zeros((0, 3))
             return due, none.astype(int), none, none, watch
-        patch = _about(skin, patch, points[due])
-        if not len(patch):
-            return due[:0], patch, np.zeros((0, 3)), np.zeros((0, 3)), watch
         found = Surface(skin, patch).closest(points[due])
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
@@ -302,12 +299,6 @@ class LipContact:
         watch = watch.answered(due, np.where(behind, 0.0, np.minimum(depth, _TRUSTED_MM)))
         out = way[maybe] + self.options.gap_mm * normal[maybe]
         return mine[due[maybe]], corners[maybe], found.barycentric[maybe], out, watch
-
-
-def _about(skin, patch, points):
-    """Faces of a patch that may be as near to points (k, 3) as counts."""
-    low, high = points.min(axis=0) - _MOST_MM, points.max(axis=0) + _MOST_MM
-    return patch[touching((skin[:, 0] > low[0]) & (skin[:, 0] < high[0]), patch)]
 
 
 def _winding(vertices, faces, points):

@@ -18,12 +18,17 @@ def wave(x):
     return 2.0 * np.cos(x / 12.0)
 
 
+def traced(V, F, aside):
+    """The crease found from a line that lies aside of the wave, and its points that are not near its ends."""
+    x = np.linspace(-22, 22, 30)
+    start = np.stack([x, wave(x) + aside, 0 * x], axis=1)
+    crease = trace_crease(V, F, start, np.array([0.0, 0.0, 1.0]))
+    return crease, crease.points[np.abs(crease.points[:, 0]) < 20]
+
+
 def test_the_groove_is_found_from_a_line_two_millimetres_off():
     V, F = grooved_sheet(wave)
-    x = np.linspace(-22, 22, 30)
-    start = np.stack([x, wave(x) + 2.0, 0 * x], axis=1)
-    crease = trace_crease(V, F, start, np.array([0.0, 0.0, 1.0]))
-    inner = crease.points[np.abs(crease.points[:, 0]) < 20]
+    crease, inner = traced(V, F, 2.0)
     assert crease.found
     assert np.abs(inner[:, 1] - wave(inner[:, 0])).max() < 0.4
     assert abs(crease.points[0, 0] + 24) < 1.5 and abs(crease.points[-1, 0] - 24) < 1.5
@@ -36,10 +41,7 @@ def test_the_middle_of_a_filled_groove_is_followed():
         return -0.7 + 0.05 * np.sin(x / 2.5) * (y - wave(x))
 
     V, F = grooved_sheet(wave, depth=2.2, width=1.0, floor=floor, step=0.25)
-    x = np.linspace(-22, 22, 30)
-    start = np.stack([x, wave(x) + 1.0, 0 * x], axis=1)
-    crease = trace_crease(V, F, start, np.array([0.0, 0.0, 1.0]))
-    inner = crease.points[np.abs(crease.points[:, 0]) < 18]
+    crease, inner = traced(V, F, 1.0)
     assert crease.found
     assert np.abs(inner[:, 1] - wave(inner[:, 0])).mean() < 0.25
 
