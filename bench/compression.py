@@ -72,7 +72,7 @@ def generated_sets():
 
 def face_sets(name, textures, seed=0):
     """(name, TextureSet, inf): sets of 16 or more of the faces of a set, taken by chance; in two of them another face
-    is the neutral one. All of them at half the height and width too."""
+    is the neutral one. All of them smaller too."""
     rng = np.random.default_rng(seed)
     faces = [textures.neutral, *textures.textures]
     for count, neutral in ((16, 0), (16, 0), (17, 0), (18, 0), (19, 0), (16, 7), (20, 13)):
@@ -86,7 +86,13 @@ def face_sets(name, textures, seed=0):
         )
         yield f"{name}: {count} of them" + (f" against {neutral}" if neutral else ""), some, np.inf
     small = [halved(face) for face in faces]
-    yield f"{name}: at half the size", TextureSet.of(small[0], small[1:], textures.names, textures.mesh), np.inf
+    smaller = {
+        "at half the size": small,
+        "at a quarter": [halved(face) for face in small],
+        "every second texel": [np.ascontiguousarray(face[::2, ::2]) for face in faces],
+    }
+    for how, (neutral, *others) in smaller.items():
+        yield f"{name}: {how}", TextureSet.of(neutral, others, textures.names, textures.mesh), np.inf
 
 
 def halved(image):
@@ -195,9 +201,12 @@ def border_ratios(textures, packed, blends=30, seed=0):
     masks, _ = build_masks(textures.mesh, grid, 53)
     owner = grid.upsample(masks).argmax(axis=2)
     inside = textures.covered[:, 1:] & textures.covered[:, :-1], textures.covered[1:] & textures.covered[:-1]
-    # Weights are interpolated between centres of cells: their kinks lie at 4, 12, 20 ... texels, cells end at 8, 16 ...
+    # Weights are interpolated between centres of cells: of eight texels their kinks lie at 4, 12, 20 ..., cells end at
+    # 8, 16 ...
     borders = {
-        "blocks": [np.broadcast_to(k % 4 == 0, ok.shape) for k, ok in zip(_edges(height, width), inside)],
+        "blocks": [
+            np.broadcast_to(k % (grid.cell // 2) == 0, ok.shape) for k, ok in zip(_edges(height, width), inside)
+        ],
         "masks": [owner[:, 1:] != owner[:, :-1], owner[1:] != owner[:-1]],
     }
     sums = {where: np.zeros(4) for where in borders}

@@ -19,11 +19,11 @@ from common import Verdict
 from compression_web import cases, node
 
 from facewright.compress import facezip_decode
-from facewright.compress.folder import atlas_shape, weight_atlas
+from facewright.compress.folder import atlas_places, uv_scale, weight_atlas, weight_layers
 from facewright.compress.ktx2 import as_rgba
 from facewright.compress.runtime import HLSL
 
-LAYERS = 128
+PLACES = 128
 ENTRIES = (
     "float4 main(float4 position : SV_Position) : SV_Target { return FacezipWeights(int2(position.xy)); }",
     "float4 main(float2 uv : TEXCOORD0) : SV_Target { return Facezip(uv); }",
@@ -46,7 +46,7 @@ def main():
 
 def translated(folder, entry, upwards):
     """GLSL ES 3.00 of the fragment shader with this entry."""
-    head = f"#define FACEZIP_LAYERS {LAYERS}\n" + ("#define FACEZIP_UPWARDS\n" if upwards else "")
+    head = f"#define FACEZIP_PLACES {PLACES}\n" + ("#define FACEZIP_UPWARDS\n" if upwards else "")
     (folder / "shader.hlsl").write_text(head + HLSL + entry)
     command = [
         "glslangValidator",
@@ -68,25 +68,19 @@ def translated(folder, entry, upwards):
 
 def largest_gap(folder, passes, packed, blend, upwards):
     """Largest difference between the shader and facezip_decode, codes."""
-    layers, rows, columns, _ = packed.weights.shape
-    across, down = atlas_shape(layers, rows, columns)
+    rows, columns = packed.weights.shape[1:3]
     height, width = packed.neutral.shape[:2]
-    summed = np.zeros((layers, 4))
-    k = len(packed.textures)
+    gains, offset = np.zeros((PLACES, 4)), np.zeros(4)
+    k, layers = len(packed.textures), weight_layers(packed)
     for weight, layer in zip(blend, packed.layers):
-        summed[layer, :k] += weight
-    step, zero = (np.pad(x, ((0, 0), (0, 4 - k))) for x in (packed.weight_step, packed.weight_zero))
-    gain = 255 * step * summed
-    places = np.arange(layers)
-    if upwards:
-        places = (down - 1 - places // across) * across + places % across
-    gains = np.zeros((LAYERS, 4))
-    gains[places] = gain
-    offset = (gain / 255 * zero).sum(axis=0)
+        for i, (step, zero, (place, channel)) in enumerate(zip(*layers[layer].values())):
+            gains[place, channel] += 255 * step * weight
+            offset[i] += step * weight * zero
     steps, zeros = (channels(x, packed.neutral.shape[2]) for x in (packed.texture_step, packed.texture_zero))
-    scale = width / (8 * columns), height / (8 * rows)
-    floats = np.concatenate([gains.ravel(), offset, steps.ravel(), zeros.ravel() / 255, scale]).astype("<f4")
-    integers = np.array([columns, rows, across, across * down if upwards else layers], "<i4")
+    floats = [gains.ravel(), offset, steps.ravel(), zeros.ravel() / 255, uv_scale(packed)]
+    floats = np.concatenate(floats).astype("<f4")
+    # A vector of two integers begins at a multiple of eight bytes, the block ends at one of sixteen.
+    integers = np.array([columns, rows, *atlas_places(packed), k == 3, 0, 0, 0], "<i4")
     images = {"facezipAtlas": weight_atlas(packed), "facezipNeutral": as_rgba(packed.neutral)}
     drawn = [as_rgba(image) for image in packed.textures]
     for i in range(4):

@@ -24,7 +24,11 @@ def add_arguments(parser):
     parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the packed set")
     parser.add_argument("--method", choices=("refined", "paper"), default="refined", help="default: refined")
     parser.add_argument("--masks", type=int, default=53, help="masks of --method paper (default: 53)")
-    parser.add_argument("--textures", type=int, default=4, help="difference textures (default: 4)")
+    parser.add_argument(
+        "--textures",
+        type=int,
+        help="difference textures (default: 4, or 3 with finer weight maps where that leaves less in the same memory)",
+    )
     parser.add_argument(
         "--budget", metavar="SIZE", help="for example 8MB: as many difference textures as fit in memory"
     )

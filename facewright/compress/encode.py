@@ -4,32 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from facewright.compress.masks import covered_texels
-from facewright.compress.packed import Packed, textures_within
+from facewright.compress.packed import Packed, memory_bytes, textures_within
 from facewright.compress.published import best_published
-from facewright.compress.refine import PASSES, RIDGE, gram_matrix, pca_weights, refine, settle
-from facewright.compress.store import SETTLING_TAIL, measure_tiles, root_mean, store_solution, texture_rounding
-from facewright.compress.tiles import TextureTiles, scratch_file
+from facewright.compress.solve import FINE_TEXTURES, solve_pca, solve_refined
+from facewright.compress.store import root_mean
+from facewright.compress.tiles import CELL, FINE_CELL, TextureTiles, scratch_file
 from facewright.errors import InputError
 
 # Above this, tiles lie in a file instead of memory.
 SCRATCH_BYTES = 3_000_000_000
 # What a map's error may grow by when it shares weights; its own would cost N/16 bytes a texel.
 SHARED_MAY_LOSE = 0.1
-# Of exact solutions and constant weights, which need no damping.
-LEAST_RIDGE = 1e-6
-# Where the refined error is below this share of that of PCA(K), every texture shall gain.
-CLEAR_GAIN = 0.8
-# A texture that does not is counted more, a few times, by this power of its error over a share of that in PCA(K). On
-# five sets two turns did it (power 1: three to four; 1.5 costs more of the mean; going on from the last weights with
-# few passes: five turns and not on all).
-AIM, POWER, TURNS = 0.98, 1.25, 4
+# Difference textures as published.
+TEXTURES = 4
 
 
 @dataclass(frozen=True)
@@ -37,7 +30,9 @@ class FacezipOptions:
     """Options of facezip().
 
     method      "refined", "paper" for the published one, or "pca" (constant weights, for comparison)
-    textures    number of difference textures, 1 to 8 (paper: 2 to 5); with a budget the most that it may choose
+    textures    number of difference textures, 1 to 8 (paper: 2 to 5), with weight maps at an eighth; with a budget the
+                most that it may choose. None: four, or three with weight maps at a quarter, where that takes no more
+                memory (24 textures or fewer) and leaves less
     masks       number of masks of the published method
     iterations  passes of the refinement; None: 15, and more for small sets, as long as they pay
     seed        of the samples and searches
@@ -48,7 +43,7 @@ class FacezipOptions:
     """
 
     method: str = "refined"
-    textures: int = 4
+    textures: int | None = None
     masks: int = 53
     iterations: int | None = None
     seed: int = 0
@@ -107,8 +102,8 @@ def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest
         if options.budget is not None and len(maps) > 1:
             images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
             layers = options.shapes or len(names)
-            k = textures_within(options.budget, images, layers, options.textures, len(maps))
-            options = replace(options, textures=k)
+            k = textures_within(options.budget, images, layers, options.textures or TEXTURES, len(maps))
+            options = options if k == TEXTURES else replace(options, textures=k)
         return {
             name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
         }
@@ -138,16 +133,21 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
     scale = _texel_scale(next(iter(neutrals.values())), mesh, covered, priority)
     stack = _stacked(list(neutrals.values()))
     levels = [np.iinfo(image.dtype).max for image in neutrals.values() for _ in range(image.shape[2])]
-    with scratch_file(stack.nbytes * len(names), SCRATCH_BYTES) as scratch:
-        tiles = TextureTiles(stack, len(names), scale, scratch, levels)
+    fine = _may_be_fine(options, names, keep, list(neutrals.values()))
+    with ExitStack() as files:
+
+        def scratch():
+            return files.enter_context(scratch_file(stack.nbytes * len(names), SCRATCH_BYTES))
+
+        tiles = TextureTiles(stack, len(names), scale, scratch(), levels)
         layers = _read(tiles, maps, neutrals, names, clock, progress)
         if len(maps) > 1:
             with clock.stage("solving"):
                 tiles.balance([image.shape[2] for image in neutrals.values()])
-        k = options.textures
+        k = options.textures or TEXTURES
         if options.budget is not None:
             layers_kept = options.shapes or tiles.count
-            k = textures_within(options.budget, list(neutrals.values()), layers_kept, options.textures)
+            k = textures_within(options.budget, list(neutrals.values()), layers_kept, k)
         if options.method == "paper" and tiles.count < k:
             raise InputError(
                 f"compress: {tiles.count} different textures cannot form {k} clusters; "
@@ -156,7 +156,13 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
         held = tuple(dict.fromkeys(layers[names.index(name)] for name in keep))
         plain = priority is None and len(maps) == 1
         with clock.stage("solving"):
-            encoded, errors = _encode(tiles, k, options, mesh, region, held, plain, progress)
+            if options.method == "paper":
+                encoded, errors = best_published(tiles, k, options, mesh, region, progress)
+            elif options.method == "pca":
+                encoded, errors = solve_pca(tiles, k)
+            else:
+                finer = (lambda: tiles.recut(FINE_CELL, scratch())) if fine else None
+                encoded, errors = solve_refined(tiles, k, options.iterations, held, plain, finer, progress)
     report = {
         "method": options.method,
         "textures": len(encoded["textures"]),
@@ -196,6 +202,7 @@ def _split(encoded, errors, neutrals, names, layers, report):
             weight_zero=encoded["weight_zero"],
             names=names,
             layers=layers,
+            cell=encoded["cell"],
             report=about,
         )
         first = mine.stop
@@ -261,138 +268,28 @@ def _as_image(image, name):
     return image
 
 
+def _may_be_fine(options, names, keep, neutrals):
+    """Whether three difference textures with finer weight maps are open, and take no more memory than four."""
+    layers = options.shapes or len(names)
+    fine, usual = (
+        memory_bytes(neutrals, k, layers, cell=cell) for k, cell in ((FINE_TEXTURES, FINE_CELL), (TEXTURES, CELL))
+    )
+    free = options.method == "refined" and options.textures is None and not keep and len(names) > TEXTURES
+    return free and fine <= usual and (options.budget is None or usual <= options.budget)
+
+
 def _check(options, names, keep):
+    textures = options.textures or TEXTURES
     if options.method not in ("refined", "paper", "pca"):
         raise ValueError(f"method {options.method!r}: refined, paper or pca")
-    if not 1 <= options.textures <= 8:
-        raise InputError(f"compress: {options.textures} difference textures; 1 to 8 are possible")
-    if options.method == "paper" and options.textures > 5:
+    if not 1 <= textures <= 8:
+        raise InputError(f"compress: {textures} difference textures; 1 to 8 are possible")
+    if options.method == "paper" and textures > 5:
         raise InputError("compress: --method paper searches among permutations of 5 textures at most; use refined")
     missing = [name for name in keep if name not in names]
     if missing:
         raise InputError(f"compress: --keep {missing[0]}: there is no such texture; there are {', '.join(names[:12])}")
-    if len(set(keep)) > options.textures:
-        raise InputError(f"compress: {len(keep)} textures to keep, but only {options.textures} difference textures")
+    if len(set(keep)) > textures:
+        raise InputError(f"compress: {len(keep)} textures to keep, but only {textures} difference textures")
     if keep and options.method != "refined":
         raise InputError("compress: --keep works with --method refined only")
-
-
-def _encode(tiles, k, options, mesh, region, held, plain, progress):
-    """What is stored, and the RMSE of every texture and channel; PCA is no measure unless plain."""
-    if options.method == "paper":
-        return best_published(tiles, k, options, mesh, region, progress)
-    gram = gram_matrix(tiles)
-    if options.method == "pca":
-        result = _store_pca(tiles, gram, k)
-        return result, measure_tiles(tiles, result)
-    exact = _exact_basis(tiles, gram, k, held)
-    if exact is not None:
-        result = store_solution(tiles, exact, LEAST_RIDGE, exact=True, report={"solution": "exact"})
-        return result, measure_tiles(tiles, result)
-    start = pca_weights(gram, k)
-    if held:
-        start[list(held)] = 0
-        start[:, : len(held)] = 0
-        start[list(held), range(len(held))] = 1
-    ridge = ridge_for(gram, k)
-    share = partial(progress, "refining")
-    result, errors = _refined(tiles, start, ridge, options.iterations, share, float(gram.trace()), held)
-    if plain and not held:
-        return _no_worse_than_pca(tiles, gram, ridge, options, progress, result, errors)
-    return result, errors
-
-
-def _refined(tiles, start, ridge, passes, share, energy=0.0, held=()):
-    """The refined solution as stored, and its errors; textures count as tiles.emphasis says."""
-    emphasis = np.float32(1) if tiles.emphasis is None else tiles.emphasis
-    weights, values = refine(
-        tiles, start * emphasis, energy=energy, iterations=passes, ridge=ridge, keep=held, progress=share
-    )
-    if values:
-        whole = range(len(held))
-        rounding = texture_rounding(tiles, weights, ridge, held, whole, SETTLING_TAIL)
-        weights = settle(tiles, weights, rounding.of_part, ridge=ridge, keep=held)
-    weights /= emphasis
-    # Few textures leave little noise to damp: a smaller ridge in the end then costs no range.
-    last = min(ridge, 1e-4) if tiles.count <= 4 else ridge
-    result = store_solution(tiles, weights, last, held=held, report={"solution": "refined", "passes": len(values)})
-    return result, measure_tiles(tiles, result)
-
-
-def _no_worse_than_pca(tiles, gram, ridge, options, progress, result, errors):
-    """The refined solution, or one that makes no texture worse than PCA(K) does, or PCA(K) itself where it is better.
-
-    A few strong textures govern constant weights, which then hold them almost exactly; the least sum of squares gives
-    some of that up. Where refining gains much on the whole, these textures are made to count more until they gain too.
-    """
-    k = len(result["textures"])
-    rmse, wanted = root_mean(errors), pca_rmse(tiles, gram, k)
-    clear = rmse.mean() <= CLEAR_GAIN * wanted.mean()
-    if (rmse <= wanted).all() if clear else rmse.mean() <= wanted.mean():
-        return result, errors
-    constant = _store_pca(tiles, gram, k)
-    constant_errors = measure_tiles(tiles, constant)
-    if not clear:
-        better = root_mean(constant_errors).mean() < rmse.mean()
-        return (constant, constant_errors) if better else (result, errors)
-    # Half a code is rounding.
-    wanted = np.maximum(root_mean(constant_errors), 0.5 * tiles.unit)
-    ratio, emphasis, start = rmse / wanted, np.ones(tiles.count), pca_weights(gram, k)
-    worst = ratio.max()
-    passes = PASSES if options.iterations is None else options.iterations
-    for turn in range(TURNS):
-        if worst < 1:
-            break
-        emphasis = emphasis * np.maximum(ratio / AIM, 1) ** POWER
-        tiles.emphasis = (emphasis / np.sqrt((emphasis**2).mean())).astype(np.float32)[:, None]
-        # What is held almost exactly shows the damping: where two turns are not enough there is less of it.
-        damping = ridge if turn < 2 else 0.5 * ridge
-        share = partial(progress, f"evening out {turn + 1}")
-        trial, trial_errors = _refined(tiles, start, damping, passes, share)
-        tiles.emphasis = None
-        ratio = root_mean(trial_errors) / wanted
-        if ratio.max() < worst and root_mean(trial_errors).mean() <= CLEAR_GAIN * root_mean(constant_errors).mean():
-            result, errors, worst = trial, trial_errors, ratio.max()
-    return result, errors
-
-
-def ridge_for(gram, k):
-    """Ridge of the difference textures per texture: RIDGE, less where K components leave next to nothing of the energy
-    (the damping would be most of the error) and for few textures, which leave little noise to damp."""
-    values = np.maximum(np.linalg.eigvalsh(gram), 0)
-    left = values[:-k].sum() / max(values.sum(), 1e-30)
-    return float(np.clip(RIDGE * left / 0.05, LEAST_RIDGE, RIDGE))
-
-
-def _store_pca(tiles, gram, k):
-    start = pca_weights(gram, k)
-    constant = np.broadcast_to(start, (*tiles.grid.cells, *start.shape))
-    return store_solution(tiles, constant, LEAST_RIDGE, report={"solution": "pca"})
-
-
-def pca_rmse(tiles, gram, k):
-    """(N,) RMSE of every texture when the k leading components are kept in float, from the (N, N) Gram matrix."""
-    values, vectors = np.linalg.eigh(gram)
-    left = np.diag(gram) - (vectors[:, -k:] ** 2 * values[-k:]).sum(axis=1)
-    return np.sqrt(np.maximum(left, 0) / (max((tiles.scale > 0).sum(), 1) * tiles.channels))
-
-
-def _exact_basis(tiles, gram, k, held):
-    """Constant weights where K of the textures span all (or there are no more than K), else None."""
-    n = len(gram)
-    rest, chosen = gram.copy(), []
-    limit = 1e-9 * max(gram.trace(), 1e-30)
-    for step in range(min(k, n)):
-        pivot = held[step] if step < len(held) else int(np.argmax(np.diag(rest)))
-        if rest[pivot, pivot] <= limit and step >= len(held):
-            break
-        chosen.append(pivot)
-        rest = rest - np.outer(rest[:, pivot], rest[pivot]) / max(rest[pivot, pivot], 1e-30)
-    texels = max(float((tiles.scale > 0).sum()) * tiles.channels, 1.0)
-    if n > k and np.sqrt(max(np.diag(rest).max(), 0) / texels) > 0.6 * tiles.unit:
-        return None
-    weights = np.zeros((n, max(len(chosen), 1)))  # no more difference textures than it takes
-    if chosen:
-        weights[:] = np.linalg.lstsq(gram[np.ix_(chosen, chosen)], gram[chosen], rcond=1e-12)[0].T
-        weights[chosen] = np.eye(len(chosen))
-    return np.broadcast_to(weights, (*tiles.grid.cells, *weights.shape))

@@ -19,10 +19,10 @@ from facewright.compress.published import published_search
 from facewright.compress.tiles import TextureTiles
 
 METHODS = {
-    "PCA(4)": FacezipOptions("pca"),
+    "PCA(4)": FacezipOptions("pca", textures=4),
     "PCA(8)": FacezipOptions("pca", textures=8),
-    "no permutation": FacezipOptions("paper", permute=False),
-    "published": FacezipOptions("paper"),
+    "no permutation": FacezipOptions("paper", textures=4, permute=False),
+    "published": FacezipOptions("paper", textures=4),
     "refined": FacezipOptions(),
 }
 MASK_COUNTS = (5, 13, 23, 33, 43, 53, 63, 83)

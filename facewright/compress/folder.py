@@ -15,14 +15,14 @@ from PIL import Image
 
 from facewright.compress.files import read_texture
 from facewright.compress.ktx2 import encoder_missing, raw_ktx2, texture_ktx2
-from facewright.compress.packed import Packed, atlas_shape
+from facewright.compress.packed import Packed, atlas_shape, place_count, weight_places
 from facewright.compress.runtime import GLSL, HLSL
 from facewright.compress.threads import in_threads
-from facewright.compress.tiles import Grid
+from facewright.compress.tiles import CELL, FINE_CELL, Grid
 from facewright.errors import InputError
 from facewright.write.files import file_name
 
-FORMAT = "facezip-1"
+FORMAT = "facezip-2"
 INDEX = "facezip.json"
 HIDDEN = ".facezip-"
 # How hard PNG tries: 1 takes a quarter of the time of 6 and is 12 % larger (five images of 512 x 512).
@@ -64,8 +64,9 @@ def _shared(packed):
         "size": [width, height],
         "meaning": "a stored code q stands for (q - zero) * step, in units of 1/255 of full scale for textures",
         "origin": "row 0 is the top of the image; weights are upsampled bilinearly, clamped to the edge",
+        "weight_cell": packed.cell,
         "weight_size": [columns, rows],
-        "weight_uv_scale": [width / (8 * columns), height / (8 * rows)],
+        "weight_uv_scale": uv_scale(packed),
         "expressions": {name: int(layer) for name, layer in zip(packed.names, packed.layers)},
     }
 
@@ -92,22 +93,40 @@ def _write_weights(store, packed, prefix):
         store.image(f"{prefix}weights{start // 4 or ''}", weight_atlas(packed, start), raw=True)
         for start in range(0, len(packed.textures), 4)
     ]
-    steps, zeros = packed.weight_step.tolist(), packed.weight_zero.tolist()
-    return {
-        "atlas": atlas,
-        "places": list(atlas_shape(*packed.weights.shape[:3])),
-        "layers": [{"step": step, "zero": zero} for step, zero in zip(steps, zeros)],
-    }
+    return {"atlas": atlas, "places": list(atlas_places(packed)), "layers": weight_layers(packed)}
+
+
+def uv_scale(packed):
+    """[x, y]: what uv is multiplied by to read a weight map, whose last cells may reach beyond the image."""
+    rows, columns = packed.weights.shape[1:3]
+    height, width = packed.neutral.shape[:2]
+    return [width / (packed.cell * columns), height / (packed.cell * rows)]
+
+
+def weight_layers(packed):
+    """For each weight map the step, the zero and the [place, channel] in the atlas of every difference texture."""
+    keys = ("step", "zero", "at")
+    places = weight_places(len(packed.weights), packed.weights.shape[3])
+    rows = zip(packed.weight_step.tolist(), packed.weight_zero.tolist(), places.tolist())
+    return [dict(zip(keys, row)) for row in rows]
+
+
+def atlas_places(packed):
+    """(across, down) places of the atlas of a Packed."""
+    layers, rows, columns, k = packed.weights.shape
+    return atlas_shape(place_count(layers, k), rows, columns)
 
 
 def weight_atlas(packed, start=0):
     """(h, w, 4) uint8: the weight maps of difference textures start to start + 3, all layers in one image."""
     layers, rows, columns, k = packed.weights.shape
-    across, down = atlas_shape(layers, rows, columns)
-    image = np.zeros((down, rows, across, columns, 4), np.uint8)
-    for n in range(layers):
-        image[n // across, :, n % across, :, : min(4, k - start)] = packed.weights[n, :, :, start : start + 4]
-    return image.reshape(down * rows, across * columns, 4)
+    across, down = atlas_places(packed)
+    image = np.zeros((down, across, 4, rows, columns), np.uint8)
+    for weights, places in zip(packed.weights, weight_places(layers, k)):
+        for i in range(start, min(start + 4, k)):
+            place, channel = places[i]
+            image[place // across, place % across, channel] = weights[:, :, i]
+    return np.ascontiguousarray(image.transpose(0, 3, 1, 4, 2)).reshape(down * rows, across * columns, 4)
 
 
 class _Store:
@@ -263,7 +282,7 @@ def _read_map(folder, about, entry):
     weights = entry.get("weights", about["weights"])
     columns, rows = about["weight_size"]
     across, down = weights["places"]
-    count, k = len(weights["layers"]), len(differences)
+    count, k, cell = len(weights["layers"]), len(differences), about["weight_cell"]
     atlas = np.concatenate([read_texture(_inside(folder, a["file"])) for a in weights["atlas"]], axis=2)
     neutral = read_texture(_inside(folder, entry["neutral"]["file"]))
     textures = np.stack([read_texture(_inside(folder, d["file"])) for d in differences])
@@ -273,8 +292,10 @@ def _read_map(folder, about, entry):
     fits = (
         textures.shape[1:] == neutral.shape
         and textures.dtype == neutral.dtype
-        and (rows, columns) == Grid(*neutral.shape[:2]).cells
-        and atlas.shape[:2] == (down * rows, across * columns)
+        and cell in (CELL, FINE_CELL)
+        and (rows, columns) == Grid(*neutral.shape[:2], cell).cells
+        and atlas.shape == (down * rows, across * columns, 4 * -(-k // 4))
+        and across * down >= place_count(count, k)
         and steps.shape == zeros.shape == (k, neutral.shape[2])
         and weight_steps.shape == weight_zeros.shape == (count, k)
         and all(np.isfinite(x).all() for x in (steps, zeros, weight_steps, weight_zeros))
@@ -284,17 +305,20 @@ def _read_map(folder, about, entry):
     )
     if not fits:
         raise ValueError(f"images and {INDEX} do not fit each other")
-    cells = atlas.reshape(down, rows, across, columns, -1).transpose(0, 2, 1, 3, 4)
+    maps = atlas.reshape(down, rows, across, columns, -1, 4).transpose(0, 2, 4, 5, 1, 3)
+    maps = maps.reshape(down * across, -1, 4, rows, columns)
+    place, channel = weight_places(count, k).transpose(2, 0, 1)
     return Packed(
         neutral=neutral,
         textures=textures,
         texture_step=steps,
         texture_zero=zeros,
-        weights=np.ascontiguousarray(cells.reshape(-1, rows, columns, atlas.shape[2])[:count, :, :, :k]),
+        weights=np.ascontiguousarray(maps[place, np.arange(k) // 4, channel].transpose(0, 2, 3, 1)),
         weight_step=weight_steps,
         weight_zero=weight_zeros,
         names=tuple(about["expressions"]),
         layers=layers,
+        cell=cell,
         report=entry["report"],
     )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from facewright.compress.tiles import STEP, Grid
+from facewright.compress.tiles import CELL, Grid
 from facewright.errors import InputError
 
 LARGEST_SIDE = 16384
@@ -20,6 +20,7 @@ class Packed:
     textures      (K, h, w, C) codes like neutral; texture_step, texture_zero (K, C)
     weights       (L, rows, columns, K) uint8 codes; weight_step, weight_zero (L, K)
     names         of the N expressions; layers (N,) the weight map of each (equal textures share one)
+    cell          texels along a weight texel: 8 as published, or 4
     report        numbers of the encoder
     """
 
@@ -32,12 +33,13 @@ class Packed:
     weight_zero: np.ndarray
     names: tuple[str, ...]
     layers: np.ndarray
+    cell: int = CELL
     report: dict = field(default_factory=dict)
 
     @property
     def grid(self):
         """The lattice of texels and cells."""
-        return Grid(*self.neutral.shape[:2])
+        return Grid(*self.neutral.shape[:2], self.cell)
 
     @property
     def unit(self):
@@ -56,11 +58,29 @@ class Packed:
 
     def memory_bytes(self):
         """Bytes on a graphics card without block compression: RGB or what the maps have, weights four to an RGBA."""
-        return memory_bytes([self.neutral], len(self.textures), len(self.weights))
+        return memory_bytes([self.neutral], len(self.textures), len(self.weights), cell=self.cell)
+
+
+def weight_places(layers, k):
+    """(layers, K, 2): the place of every weight in the atlas, and its channel there.
+
+    A layer has a place of its own with a channel for each difference texture (the fifth and on are in a second image);
+    with three difference textures, four layers lie in three places, so that no channel is left empty.
+    """
+    if k == 3:
+        channel = np.arange(3 * layers).reshape(layers, 3)
+        return np.stack([channel // 4, channel % 4], axis=2)
+    layer, channel = np.meshgrid(np.arange(layers), np.arange(k) % 4, indexing="ij")
+    return np.stack([layer, channel], axis=2)
+
+
+def place_count(layers, k):
+    """Places that so many weight maps of K difference textures take."""
+    return -(-3 * layers // 4) if k == 3 else layers
 
 
 def atlas_shape(count, rows, columns):
-    """(across, down) places of weight maps in one image: layer n lies at (n % across, n // across)."""
+    """(across, down) places of an atlas: place n lies at (n % across, n // across)."""
     fits = [
         (across * -(-count // across), max(across * columns, -(-count // across) * rows), across)
         for across in range(1, count + 1)
@@ -75,10 +95,10 @@ def atlas_shape(count, rows, columns):
     return across, -(-count // across)
 
 
-def memory_bytes(neutrals, k, layers, sets=1):
+def memory_bytes(neutrals, k, layers, sets=1, cell=CELL):
     """Bytes of maps with neutrals like these and k difference textures each, and of so many sets of weight maps."""
-    rows, columns = Grid(*neutrals[0].shape[:2]).cells
-    across, down = atlas_shape(layers, rows, columns)
+    rows, columns = Grid(*neutrals[0].shape[:2], cell).cells
+    across, down = atlas_shape(place_count(layers, k), rows, columns)
     images = sum(neutral.nbytes for neutral in neutrals)
     return int(images * (1 + k) + sets * across * down * -(-k // 4) * 4 * rows * columns)
 
@@ -210,7 +230,6 @@ def naive_example(neutral, textures, B, m):
 
 
 __all__ = [
-    "STEP",
     "Packed",
     "blend_vector",
     "decode_float",

@@ -10,23 +10,23 @@ from importlib import resources
 import numpy as np
 from PIL import Image
 
-from facewright.compress.folder import weight_atlas
+from facewright.compress.folder import atlas_places, uv_scale, weight_atlas, weight_layers
 from facewright.compress.ktx2 import as_rgba
-from facewright.compress.packed import atlas_shape
+from facewright.compress.packed import place_count
 from facewright.compress.runtime import GLSL
 
 # Texels of all originals together; above it they are shown at half the size, and so on.
 MOST_TEXELS = 12_000_000
-# The weight pass holds a vector for each weight map among its uniforms; WebGL 2 grants 224 vectors.
-MOST_LAYERS = 200
+# The weight pass holds a vector for each place of the atlas among its uniforms; WebGL 2 grants 224 vectors.
+MOST_PLACES = 200
 
 
 def preview_missing(packed):
     """Why a Packed cannot be shown, in one sentence, or ""."""
     if len(packed.textures) > 4:
         return f"preview.html is left out: the shader reads 4 difference textures, not {len(packed.textures)}"
-    if len(packed.weights) > MOST_LAYERS:
-        return f"preview.html is left out: {len(packed.weights)} weight maps, {MOST_LAYERS} are possible"
+    if place_count(len(packed.weights), len(packed.textures)) > MOST_PLACES:
+        return f"preview.html is left out: {len(packed.weights)} weight maps are more than a shader's uniforms hold"
     return ""
 
 
@@ -41,7 +41,7 @@ def preview_page(packed, fetch, count, *, title="FaceZip", examples=None):
     while (height // factor) * (width // factor) * count > MOST_TEXELS and min(height, width) // factor > 16:
         factor *= 2
     rows, columns = packed.weights.shape[1:3]
-    across, _ = atlas_shape(*packed.weights.shape[:3])
+    across, down = atlas_places(packed)
     wide = np.iinfo(packed.neutral.dtype).max / 255  # 16 bits are shown in 8
     shares = np.eye(count) if examples is None else np.linalg.pinv(examples)
     channels = packed.neutral.shape[2]
@@ -67,12 +67,11 @@ def preview_page(packed, fetch, count, *, title="FaceZip", examples=None):
         ],
         "atlas": _encode(weight_atlas(packed)),
         "across": across,
+        "places": across * down,
         "weightSize": [columns, rows],
-        "uvScale": [width / (8 * columns), height / (8 * rows)],
+        "uvScale": uv_scale(packed),
         "layerOf": packed.layers.tolist(),
-        "layers": [
-            {"step": _pad(step), "zero": _pad(zero)} for step, zero in zip(packed.weight_step, packed.weight_zero)
-        ],
+        "layers": weight_layers(packed),
         "mix": [[[int(n), float(row[n])] for n in np.flatnonzero(row)] for row in shares],
         "originals": [_png(fetch(n), factor) for n in range(count)],
     }
@@ -85,10 +84,6 @@ def _four(values, channels, rest):
     """Values of the channels as the four of a shader; grey counts for red, green and blue."""
     values = np.repeat(values, 3) if channels == 1 else values
     return [*map(float, values), *[rest] * (4 - len(values))]
-
-
-def _pad(values):
-    return [*map(float, values), *[0.0] * (4 - len(values))]
 
 
 def _png(image, factor):

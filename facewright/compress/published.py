@@ -17,7 +17,6 @@ from facewright.compress.masks import build_masks
 from facewright.compress.refine import Pass
 from facewright.compress.store import measure_tiles, quantise_textures, quantise_weights, root_mean, stored_parts
 from facewright.compress.threads import in_threads
-from facewright.compress.tiles import TEXELS
 from facewright.errors import InputError
 
 MOST_BLOCKS = 64
@@ -297,18 +296,20 @@ def _encode_published(tiles, k, options, mesh, region, progress):
     n = tiles.count
     work = Pass(tiles, k)
     flat = np.ascontiguousarray(shares).reshape(-1, n, k)
-    d = np.empty((len(tiles), k, tiles.channels, TEXELS), np.float32)
+    d = np.empty((len(tiles), k, tiles.channels, tiles.grid.texels), np.float32)
 
     def one(part):
         rows = flat[work.corners[part]].transpose(0, 1, 3, 2).reshape(-1, 4 * k, n)
-        y = (rows @ tiles.differences(part, whole=True)).reshape(-1, 4, k, tiles.channels, TEXELS)
+        y = (rows @ tiles.differences(part, whole=True)).reshape(-1, 4, k, tiles.channels, tiles.grid.texels)
         d[part] = (y * work.basis[:, None, None]).sum(axis=1)
 
     in_threads(one, tiles.chunks())
-    image = tiles.grid.join(d.reshape(len(d), -1, TEXELS)).reshape(tiles.grid.height, tiles.grid.width, k, -1)
+    image = tiles.grid.join(d.reshape(len(d), -1, tiles.grid.texels)).reshape(
+        tiles.grid.height, tiles.grid.width, k, -1
+    )
     stored = quantise_weights(np.ascontiguousarray(weights.transpose(2, 0, 1, 3)))
     report = {**about, "permutation_cost": cost, "solution": "published"}
-    return stored_parts(quantise_textures(tiles, image), stored, report)
+    return stored_parts(tiles, quantise_textures(tiles, image), stored, report)
 
 
 def published_search(tiles, masks, k, seed=0, progress=None):

@@ -21,14 +21,15 @@ from itertools import pairwise
 import numpy as np
 
 from facewright.compress.threads import THREADS, in_threads
-from facewright.compress.tiles import TEXELS, bilinear_basis
+from facewright.compress.tiles import CELL, bilinear_basis
 
 SWEEPS = 4
 SMOOTH = 3e-4
 RIDGE = 0.003
-# Passes: so many, and more where they are cheap: PLENTY over tiles times textures (0.7 seconds of two cores), MOST at
-# most, as long as one takes PAYS of the error's square.
+# Passes: so many, and more where they are cheap: PLENTY over tiles of 64 texels times textures (0.7 seconds of two
+# cores), MOST at most, as long as one takes PAYS of the error's square. With finer cells a pass takes twice as long.
 PASSES, MOST, PLENTY, PAYS = 15, 90, 9e5, 1e-3
+FINE_PASSES, FINE_COST = 11, 2
 # Passes that know how the textures will be stored.
 SETTLING = 2
 
@@ -59,12 +60,12 @@ class Pass:
 
     def __init__(self, tiles, k, fixed=()):
         self.tiles, self.k, self.fixed = tiles, k, tuple(fixed)
-        self.basis = bilinear_basis()
-        self.products = np.einsum("ap,bp->abp", self.basis, self.basis).reshape(16, TEXELS)
+        self.basis = bilinear_basis(tiles.grid.cell)
+        self.products = np.einsum("ap,bp->abp", self.basis, self.basis).reshape(16, -1)
         self.corners, self.covered = tiles.grid.corner_cells(), tiles.covered_chunks()
 
     def solve_textures(self, weights, part, ridge, x=None, nearest=None):
-        """D (tiles, K, C, 64) for weights (cells, N, K), the objective of these tiles, and their differences.
+        """D (tiles, K, C, P) for weights (cells, N, K), the objective of these tiles, and their differences.
 
         nearest  function (i, values of texture i) -> the nearest that can be stored
         """
@@ -74,7 +75,7 @@ class Pass:
         t = len(corner)
         rows = np.ascontiguousarray(corner.transpose(0, 1, 3, 2)).reshape(t, 4 * k, tiles.count)
         gram = (rows @ rows.transpose(0, 2, 1)).reshape(t, 4, k, 4, k)
-        projected = (rows @ x).reshape(t, 4, k, tiles.channels, TEXELS)
+        projected = (rows @ x).reshape(t, 4, k, tiles.channels, -1)
         b = projected[:, 0] * self.basis[0]
         for c in range(1, 4):
             b += projected[:, c] * self.basis[c]
@@ -82,7 +83,7 @@ class Pass:
         for i in range(k):
             for j in range(i + 1):
                 a[i, j] = np.ascontiguousarray(gram[:, :, i, :, j]).reshape(t, 16) @ self.products
-        held = {i: x[:, n].reshape(t, tiles.channels, TEXELS) for i, n in enumerate(self.fixed)}
+        held = {i: x[:, n].reshape(t, tiles.channels, -1) for i, n in enumerate(self.fixed)}
         d = _solve_texels(a, b, k, ridge, held, nearest)
         value = -np.vdot(b, d)
         for h in held:  # these are not what minimises
@@ -111,7 +112,7 @@ class Pass:
 
 
 def _solve_texels(a, b, k, ridge, held, nearest=None):
-    """d (t, K, C, 64) with (A + ridge) d = b at every texel, by Cholesky; textures in held keep their values.
+    """d (t, K, C, P) with (A + ridge) d = b at every texel, by Cholesky; textures in held keep their values.
 
     With nearest every value is rounded before the next is solved for, which then makes up for it (Babai 1986).
     """
@@ -263,7 +264,7 @@ def refine(tiles, start, *, energy, iterations=None, ridge=RIDGE, smooth=SMOOTH,
         values.append(value)
         previous, w = w, smooth_weights(stencil, right, extrapolated, smooth)
         _hold(w, keep)
-        if iterations is None and step >= PASSES - 1 and gain < PAYS * (energy + value):
+        if iterations is None and step >= least_passes(tiles) - 1 and gain < PAYS * (energy + value):
             break
         since += 1
         # (j - 1) / (j + 1) is three passes in thirty ahead of Nesterov's own (t - 1) / t'.
@@ -277,7 +278,14 @@ def refine(tiles, start, *, energy, iterations=None, ridge=RIDGE, smooth=SMOOTH,
 
 def passes_within(tiles):
     """Passes for a set: more where its tiles and textures are few."""
-    return int(min(MOST, PASSES + PLENTY / max(sum(map(len, tiles.covered_chunks())) * tiles.count, 1)))
+    texels = sum(map(len, tiles.covered_chunks())) * tiles.grid.texels
+    cost = texels / CELL**2 * tiles.count * (FINE_COST if tiles.grid.cell < CELL else 1)
+    return int(min(MOST, least_passes(tiles) + PLENTY / max(cost, 1)))
+
+
+def least_passes(tiles):
+    """Passes that every set of such tiles takes."""
+    return FINE_PASSES if tiles.grid.cell < CELL else PASSES
 
 
 def settle(tiles, weights, rounding, ridge=RIDGE, smooth=SMOOTH, keep=()):

@@ -6,18 +6,24 @@ GLSL = """// FaceZip runtime, GLSL ES 3.00 (WebGL 2). Every value is in facezip.
 
 // Pass 1, once a frame, into a float target (RGBA16F or RGBA32F) of weight_size:
 //   outColor = facezipWeights(ivec2(gl_FragCoord.xy));
-#ifdef FACEZIP_LAYERS                       // number of weight maps
+#ifdef FACEZIP_PLACES                       // number of places of weight maps: places[0] * places[1]
 uniform highp sampler2D facezipAtlas;       // weights.png or weights.ktx2
 uniform ivec2 facezipWeightSize;            // weight_size
 uniform int facezipAcross;                  // places[0]
-uniform vec4 facezipGain[FACEZIP_LAYERS];   // 255 * step of the layer * weights of its expressions, summed
-uniform vec4 facezipOffset;                 // sum over layers of gain / 255 * zero
+uniform bool facezipThree;                  // three difference textures: four weight maps lie in three places
+uniform vec4 facezipGain[FACEZIP_PLACES];   // at [place][channel]: 255 * step * weights of the expressions, summed
+uniform vec4 facezipOffset;                 // sum over layers of step * weights * zero
 vec4 facezipWeights(ivec2 cell) {
   vec4 sum = -facezipOffset;
-  for (int n = 0; n < FACEZIP_LAYERS; n++) {
+  for (int n = 0; n < FACEZIP_PLACES; n++) {
     if (facezipGain[n] == vec4(0.0)) continue;
     ivec2 place = ivec2(n % facezipAcross, n / facezipAcross) * facezipWeightSize;
-    sum += facezipGain[n] * texelFetch(facezipAtlas, place + cell, 0);
+    vec4 part = facezipGain[n] * texelFetch(facezipAtlas, place + cell, 0);
+    if (facezipThree) {                     // channel c is of difference (n + c) % 3
+      part = vec4(part.x + part.w, part.y, part.z, 0.0);
+      part = n % 3 == 0 ? part : n % 3 == 1 ? part.zxyw : part.yzxw;
+    }
+    sum += part;
   }
   return sum;
 }
@@ -41,28 +47,36 @@ highp vec4 facezip(highp vec2 uv) {
 
 HLSL = """// FaceZip runtime, HLSL (Shader Model 5). Every value is in facezip.json; see docs/compress-engines.md.
 // uv = (0, 0) is the upper left corner of the images. No texture is sRGB; linear filter, clamp.
-#ifndef FACEZIP_LAYERS
-#define FACEZIP_LAYERS 64                    // at least the number of weight maps
+#ifndef FACEZIP_PLACES
+#define FACEZIP_PLACES 64                    // at least the number of places of weight maps
 #endif
 Texture2D facezipAtlas, facezipNeutral, facezipD0, facezipD1, facezipD2, facezipD3, facezipSum;
 SamplerState facezipLinearClamp;
 cbuffer Facezip {
-  float4 facezipGain[FACEZIP_LAYERS];        // 255 * step of the layer * weights of its expressions, summed
-  float4 facezipOffset;                      // sum over layers of gain / 255 * zero
+  float4 facezipGain[FACEZIP_PLACES];        // at [place][channel]: 255 * step * weights of the expressions, summed
+  float4 facezipOffset;                      // sum over layers of step * weights * zero
   float4 facezipStep[4];                     // differences[i].step, 0 for what is missing
   float4 facezipZero[4];                     // differences[i].zero / 255
   float2 facezipUvScale;                     // weight_uv_scale
   int2 facezipWeightSize;                    // weight_size
-  int facezipAcross;                         // places[0]
-  int facezipCount;                          // number of weight maps
+  int2 facezipPlaces;                        // places
+  int facezipThree;                          // 1 for three difference textures: four weight maps lie in three places
 };
 
 // Pass 1, once a frame, into a float target (R16G16B16A16_FLOAT) of weight_size; cell = SV_Position.xy.
 float4 FacezipWeights(int2 cell) {
   float4 sum = -facezipOffset;
-  for (int n = 0; n < facezipCount; n++) {
-    int2 place = int2(n % facezipAcross, n / facezipAcross) * facezipWeightSize;
-    sum += facezipGain[n] * facezipAtlas.Load(int3(place + cell, 0));
+  for (int n = 0; n < facezipPlaces.x * facezipPlaces.y; n++) {
+    int2 place = int2(n % facezipPlaces.x, n / facezipPlaces.x);
+#ifdef FACEZIP_UPWARDS                       // rows count from below (Unity)
+    place.y = facezipPlaces.y - 1 - place.y;
+#endif
+    float4 part = facezipGain[n] * facezipAtlas.Load(int3(place * facezipWeightSize + cell, 0));
+    if (facezipThree) {                      // channel c is of difference (n + c) % 3
+      part = float4(part.x + part.w, part.y, part.z, 0.0);
+      part = n % 3 == 0 ? part : n % 3 == 1 ? part.zxyw : part.yzxw;
+    }
+    sum += part;
   }
   return sum;
 }

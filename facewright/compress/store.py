@@ -7,7 +7,6 @@ import numpy as np
 from facewright.compress.packed import code_scale, nearest_codes, quantise
 from facewright.compress.refine import Pass
 from facewright.compress.threads import in_threads
-from facewright.compress.tiles import TEXELS
 
 # Values of difference textures beyond this share at either end are clipped, of more while weights settle (2.913 against
 # 2.920 on the faces); so many texels tell where that is.
@@ -25,7 +24,7 @@ def store_solution(tiles, weights, ridge, *, held=(), exact=False, report):
     stored = ((codes.astype(np.float32) - zero[:, None, None]) * step[:, None, None]).astype(np.float32)
     seen = stored if tiles.emphasis is None else stored * tiles.emphasis[:, None, None]
     parts = _stored_textures(tiles, seen.transpose(1, 2, 0, 3), ridge, held, exact)
-    return stored_parts(parts, (codes, step, zero), report)
+    return stored_parts(tiles, parts, (codes, step, zero), report)
 
 
 class Rounding:
@@ -37,11 +36,11 @@ class Rounding:
         self._levels = tiles.levels[:, None]
 
     def codes(self, values):
-        """Codes (..., K, C, 64) of values like them in 0-255 units."""
+        """Codes (..., K, C, P) of values like them in 0-255 units."""
         return nearest_codes(values, self._step, self._zero, self._levels)
 
     def nearest(self, i, values):
-        """The values (..., C, 64) nearest to those of texture i."""
+        """The values (..., C, P) nearest to those of texture i."""
         return (nearest_codes(values, self._step[i], self._zero[i], self._levels) - self._zero[i]) * self._step[i]
 
     def of_part(self, part):
@@ -64,7 +63,7 @@ def texture_rounding(tiles, weights, ridge, held=(), whole=(), tail=TAIL):
         d, _, _ = work.solve_textures(flat, part, ridge * tiles.count, tiles.differences(part, whole=True))
         return d.transpose(0, 3, 1, 2)[tiles.scale[part, 0] > 0]  # (texels, K, C)
 
-    every = 1 if len(whole) else max(1, len(tiles) * TEXELS // SAMPLE)
+    every = 1 if len(whole) else max(1, tiles.scale.size // SAMPLE)
     samples = np.concatenate(in_threads(one, tiles.covered_chunks(every)))
     return Rounding(tiles, *_texture_scale(tiles, samples, tail, whole))
 
@@ -76,7 +75,7 @@ def _stored_textures(tiles, weights, ridge, held, exact):
     rounding = texture_rounding(tiles, weights, ridge, held, whole)
     nearest = None if exact else rounding.nearest
     work, flat = Pass(tiles, k, held), np.ascontiguousarray(weights, np.float32).reshape(-1, tiles.count, k)
-    codes = np.empty((len(tiles), k, tiles.channels, TEXELS), tiles.data.dtype)
+    codes = np.empty((len(tiles), k, tiles.channels, tiles.grid.texels), tiles.data.dtype)
 
     def one(part):
         # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
@@ -85,7 +84,7 @@ def _stored_textures(tiles, weights, ridge, held, exact):
         codes[part] = rounding.codes(work.solve_textures(flat, part, ridge * tiles.count, x, nearest)[0])
 
     in_threads(one, tiles.chunks())
-    image = tiles.grid.join(codes.reshape(len(tiles), -1, TEXELS))
+    image = tiles.grid.join(codes.reshape(len(tiles), -1, tiles.grid.texels))
     image = image.reshape(*image.shape[:2], k, tiles.channels)
     return np.ascontiguousarray(image.transpose(2, 0, 1, 3)), rounding.step, rounding.zero
 
@@ -98,9 +97,9 @@ def _texture_scale(tiles, samples, tail=TAIL, whole=()):
     return code_scale(low, high, tiles.levels)
 
 
-def stored_parts(textures, weights, report):
+def stored_parts(tiles, textures, weights, report):
     keys = ("textures", "texture_step", "texture_zero", "weights", "weight_step", "weight_zero")
-    return {**dict(zip(keys, (*textures, *weights))), "report": report}
+    return {**dict(zip(keys, (*textures, *weights))), "cell": tiles.grid.cell, "report": report}
 
 
 def quantise_weights(weights):
@@ -123,17 +122,17 @@ def quantise_textures(tiles, d):
 
 
 def _predicted(tiles, part, textures, weights, work):
-    """(t, N, C, 64) 0-255 reconstruction of tiles from stored values, clipped."""
+    """(t, N, C, P) 0-255 reconstruction of tiles from stored values, clipped."""
     k = weights.shape[-1]
     corner = weights[work.corners[part]].transpose(0, 2, 1, 3)  # (t, N, 4, K)
     e = (textures[:, None] * work.basis[:, None, None]).reshape(len(corner), 4 * k, -1)
-    x = (corner.reshape(len(corner), -1, 4 * k) @ e).reshape(len(corner), -1, tiles.channels, TEXELS)
+    x = (corner.reshape(len(corner), -1, 4 * k) @ e).reshape(len(corner), -1, tiles.channels, tiles.grid.texels)
     x += tiles.neutral[part, None] * np.float32(tiles.unit)
     return np.clip(x, 0, 255, out=x)
 
 
 def _difference_tiles(grid, encoded, row):
-    """(columns, K, C, 64) of one row of tiles, 0-255 units."""
+    """(columns, K, C, P) of one row of tiles, 0-255 units."""
     step, zero = (encoded[key].astype(np.float32)[:, None] for key in ("texture_step", "texture_zero"))
     # Tiles reach beyond the image, where nothing counts.
     return np.stack(
@@ -151,15 +150,15 @@ def measure_tiles(tiles, encoded):
     weights = (encoded["weights"].astype(np.float32) - zero[:, None, None]) * step[:, None, None]
     weights = np.ascontiguousarray(weights.transpose(1, 2, 0, 3)).reshape(-1, tiles.count, weights.shape[-1])
     work = Pass(tiles, weights.shape[-1])
-    columns = tiles.grid.tiles[1]
+    columns, size = tiles.grid.tiles[1], tiles.chunks()[0].stop
 
     def one(row):
         part = slice(row * columns, (row + 1) * columns)
         covered = tiles.scale[part, None] > 0
         total = np.zeros((tiles.count, tiles.channels))
         textures = _difference_tiles(tiles.grid, encoded, row)
-        for start in range(0, columns, 96):
-            some = slice(start, min(start + 96, columns))
+        for start in range(0, columns, size):
+            some = slice(start, min(start + size, columns))
             at = slice(part.start + some.start, part.start + some.stop)
             x = _predicted(tiles, at, textures[some], weights, work)
             x -= tiles.data[at].astype(np.float32) * np.float32(tiles.unit)

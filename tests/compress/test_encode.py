@@ -112,6 +112,38 @@ def test_images_no_wider_than_a_weight_texel(shape):
     assert packed.report["mean_rmse"] <= constant.report["mean_rmse"] + 0.3
 
 
+def unrelated(n, size=96, seed=0):
+    """A neutral and n textures of blurred noise each its own."""
+    rng = np.random.default_rng(seed)
+    fields = [gaussian_filter(rng.normal(0, 1, (size, size, 3)), (2, 2, 0)) for _ in range(n + 1)]
+    return [np.clip(128 + 200 * field, 0, 255).astype(np.uint8) for field in fields]
+
+
+def test_unrelated_textures_take_finer_weights_in_no_more_memory_and_leave_less():
+    neutral, *images = unrelated(20)
+    published = facezip(neutral, images, options=FacezipOptions(textures=4))
+    finer = facezip(neutral, images)
+    assert (published.cell, published.memory_bytes()) == (8, (15 + 20 / 16) * 96 * 96)
+    assert (finer.cell, len(finer.textures)) == (4, 3) and finer.memory_bytes() <= published.memory_bytes()
+    assert finer.report["mean_rmse"] < 0.95 * published.report["mean_rmse"]
+    for n, image in enumerate(images):
+        told = finer.report["rmse"][f"texture{n}"]
+        assert abs(rmse(facezip_decode(finer, np.eye(20)[n]), image) - told) < 0.02 * told
+
+
+@pytest.mark.parametrize("n,shapes", [(28, None), (20, 60)])
+def test_finer_weights_never_take_more_memory(n, shapes):
+    neutral, *images = unrelated(n, 48)
+    packed = facezip(neutral, images, options=FacezipOptions(shapes=shapes))
+    assert (packed.cell, len(packed.textures)) == (8, 4)
+
+
+def test_textures_that_share_their_structure_keep_four_difference_textures():
+    made = expression_set(96, 16, strength=20, noise=0)
+    packed = facezip(made.neutral, made.textures, covered=made.covered)
+    assert (packed.cell, len(packed.textures)) == (8, 4)
+
+
 def test_a_kept_texture_is_exact():
     neutral, images = make_set(12)
     packed = facezip(neutral, images, names=[f"n{n}" for n in range(12)], keep=["n5"])
@@ -154,7 +186,8 @@ def test_a_region_of_priority_is_met_better():
     neutral, images = make_set(14, shape=(64, 64))
     priority = np.ones((64, 64))
     priority[:32] = 10
-    plain, urgent = facezip(neutral, images), facezip(neutral, images, priority=priority)
+    options = FacezipOptions(textures=4)
+    plain, urgent = (facezip(neutral, images, priority=each, options=options) for each in (None, priority))
 
     def top(packed):
         return np.mean([rmse(facezip_decode(packed, np.eye(14)[n])[:32], image[:32]) for n, image in enumerate(images)])

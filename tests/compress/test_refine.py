@@ -5,8 +5,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from facewright.compress import FacezipOptions, facezip
-from facewright.compress.encode import LEAST_RIDGE
 from facewright.compress.refine import MOST, PASSES, Pass, gram_matrix, passes_within, pca_weights, refine, settle
+from facewright.compress.solve import LEAST_RIDGE
 from facewright.compress.store import measure_tiles, root_mean, store_solution, texture_rounding
 from facewright.compress.synthetic import expression_set
 from facewright.compress.tiles import TextureTiles

@@ -14,7 +14,14 @@ COMPILER = shutil.which("glslangValidator")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no glslangValidator (Debian: glslang-tools)")
 
 INCLUDE = "#extension GL_GOOGLE_include_directive : enable\n#include"  # glslang asks for it
-UNREAL_TYPES = {"Offset": "float4", "Across": "float", "Count": "float", "WeightSize": "float2", "UV": "float2"}
+UNREAL_TYPES = {
+    "Offset": "float4",
+    "Across": "float",
+    "Count": "float",
+    "Three": "float",
+    "WeightSize": "float2",
+    "UV": "float2",
+}
 UNREAL_TYPES |= {"UvScale": "float2"} | {f"{name}{i}": "float4" for name in ("Step", "Zero") for i in range(4)}
 
 
@@ -49,7 +56,7 @@ def passed(result):
 @pytest.mark.parametrize(
     "head,body",
     [
-        ("#define FACEZIP_LAYERS 20\n", "void main() { color = facezipWeights(ivec2(gl_FragCoord.xy)); }"),
+        ("#define FACEZIP_PLACES 20\n", "void main() { color = facezipWeights(ivec2(gl_FragCoord.xy)); }"),
         ("", "in vec2 uv;\nvoid main() { color = facezip(uv); }"),
     ],
 )
