@@ -194,6 +194,18 @@ def test_eyes_turn_about_their_centres(hm08, name, axis, sign, degrees):
     assert np.isclose(np.degrees(np.arcsin(gaze[axis] / np.linalg.norm(gaze))) * sign, degrees, atol=0.1)
 
 
+def test_the_lower_lip_of_an_open_jaw_hangs_in_an_arc(hm08):
+    line = hm08.lines["lip_seam_lower"]
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(hm08.vertices[line], axis=0), axis=1))])
+    q = 1.0 - np.abs(2.0 * way / way[-1] - 1.0)  # 0 at the corners, 1 in the middle
+    drop = hm08.deltas[hm08.shape_names.index("jawOpen")][line, 1]
+    share = (drop - drop[0]) / (drop[np.argmax(q)] - drop[0])
+    inside = (q > 0.1) & (q < 0.9)
+    assert (share[inside] > 1.1 * q[inside]).all()
+    left = np.flatnonzero(way <= 0.5 * way[-1])
+    assert (np.diff(share[left]) > 0).all()
+
+
 def test_jaw_carries_teeth_and_tongue_rigidly(hm08):
     jaw_open = hm08.shape("jawOpen")
     assert not jaw_open[hm08.part("teeth_upper").vertex_slice].any()

@@ -9,7 +9,7 @@ from hm08.carry import carry_nostrils
 from hm08.shapes.canvas import Canvas
 from hm08.shapes.eyes import just_closing
 from hm08.shapes.fair import Fairing, Masks, falloff, symmetrised
-from hm08.shapes.jaw import closing
+from hm08.shapes.jaw import closing, rounded
 from hm08.shapes.sketch import FLIP, Studio, left_half, read_sketches, symmetric_field
 
 LIDS_FAIR_MM, FAIR_MM = 2.5, 4.5  # waves of a face unit shorter than about this are taken for noise
@@ -34,7 +34,9 @@ def build_shapes(raw, control, head, regions, jaw):
         elif sketch is None:
             fair = lids if name.startswith("eye") else rest
             field = fair(head.S @ (nostrils @ raw[name])) * masks.of(name)[:, None]
-            made[name] = just_closing(head, field) if name == "eyeBlinkLeft" else field
+            if name == "eyeBlinkLeft":
+                field = just_closing(head, field)
+            made[name] = rounded(head, field) if name == "jawOpen" else field
         else:
             field = settled(studio.field(sketch) * masks.of(name)[:, None])
             made[name] = left_half(head.V, field) if sketch.get("side") else field

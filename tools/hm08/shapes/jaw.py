@@ -3,14 +3,38 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hm08.regions import geodesic
+from hm08.shapes.fair import falloff
 from hm08.skeleton import hinge_of
 from hm08.spread import spread
 
 LIPS_MM = 9.0  # skin so near to the seam stays as it is in mouthClose with jawOpen
 FADE_MM = 30.0
+# hm08's lower lip goes down in straight lines from the corners to the middle, a V; of the motion beyond the corners' a
+# lip has (1 - (1 - q)^2)^ROUND at the share q of the way to the middle (ICT-FaceKit's is between that of 0.85 and 1).
+ROUND = 0.85
+LIP_MM, ROUND_FADE_MM = 7.0, 24.0
 SHARE = 0.25  # of the jaw's turn by which closed lips go down with it
+
+
+def rounded(head, jaw_open):
+    """(n, 3) jawOpen with a lower lip that hangs in a round arc; the upper lip stays, the skin around follows."""
+    V, lower, upper = head.V, head.lines["lip_seam_lower"], head.lines["lip_seam_upper"]
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(V[lower], axis=0), axis=1))])
+    q = 1.0 - np.abs(2.0 * way / way[-1] - 1.0)
+    corners = 0.5 * (jaw_open[lower[0]] + jaw_open[lower[-1]])
+    middle = jaw_open[lower[np.argmax(q)]] - corners
+    now = (jaw_open[lower] - corners) @ middle / (middle @ middle)
+    more = (1.0 - (1.0 - q) ** 2) ** ROUND - now
+    more *= 1.0 - falloff(q, (0.0, 0.05))
+    below = geodesic(V, head.F, lower)
+    lip = np.flatnonzero((below < LIP_MM) & (below < geodesic(V, head.F, upper) - 1e-9))
+    nearest = cKDTree(V[lower]).query(V[lip])[1]
+    handles = np.concatenate([lip, upper])
+    values = np.concatenate([more[nearest, None] * middle, np.zeros((len(upper), 3))])
+    return jaw_open + spread(head.K, handles, values, below > ROUND_FADE_MM)
 
 
 def closing(head, jaw_open, R, t):
