@@ -72,7 +72,7 @@ def _body(profile, channel):
     phi = 2 * np.pi * np.arange(COLUMNS) / COLUMNS
     sin, cos = np.sin(phi), np.cos(phi)
     # The last rows close like a spoon's edge.
-    end = np.sqrt(np.maximum(1 - np.clip((share - TIP) / (1 - TIP), 0, 1) ** 2, 0.02))
+    end = np.sqrt(np.maximum(1 - np.clip((share - TIP) / (1 - TIP), 0, 1) ** 3, 0.02))
     x = np.outer(wide * end, np.sign(sin) * np.abs(sin) ** 0.8)
     height = np.outer(thick * np.maximum(end, 0.5), np.sign(cos) * np.abs(cos) ** 0.9)
     height[:, cos < 0] *= 0.9
@@ -81,5 +81,5 @@ def _body(profile, channel):
     height += channel * x**2
     up = np.stack([-along[:, 1], along[:, 0]], axis=1)  # z, y of the section's upward direction
     points = np.stack([x, y[:, None] + height * up[:, 1:], z[:, None] + height * up[:, :1]], axis=2)
-    tip = [0.0, y[-1] + 0.9 * along[-1, 1], z[-1] + 0.9 * along[-1, 0]]
+    tip = [0.0, y[-1] + 0.2 * along[-1, 1], z[-1] + 0.2 * along[-1, 0]]
     return np.concatenate([points.reshape(-1, 3), [tip]])
