@@ -14,7 +14,7 @@ from facewright.compress.packed import Packed, memory_bytes, textures_within
 from facewright.compress.published import best_published
 from facewright.compress.solve import FINE_TEXTURES, solve_pca, solve_refined
 from facewright.compress.store import root_mean
-from facewright.compress.tiles import CELL, FINE_CELL, TextureTiles, scratch_file
+from facewright.compress.tiles import FINE_CELL, TextureTiles, scratch_file
 from facewright.errors import InputError
 
 # Above this, tiles lie in a file instead of memory.
@@ -50,6 +50,11 @@ class FacezipOptions:
     permute: bool = True
     budget: int | None = None
     shapes: int | None = None
+
+    @property
+    def most_textures(self):
+        """Difference textures at most."""
+        return TEXTURES if self.textures is None else self.textures
 
 
 def facezip(
@@ -102,7 +107,7 @@ def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest
         if options.budget is not None and len(maps) > 1:
             images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
             layers = options.shapes or len(names)
-            k = textures_within(options.budget, images, layers, options.textures or TEXTURES, len(maps))
+            k = textures_within(options.budget, images, layers, options.most_textures, len(maps))
             options = options if k == TEXTURES else replace(options, textures=k)
         return {
             name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
@@ -144,7 +149,7 @@ def _compress(maps, names, options, progress, *, mesh=None, covered=None, region
         if len(maps) > 1:
             with clock.stage("solving"):
                 tiles.balance([image.shape[2] for image in neutrals.values()])
-        k = options.textures or TEXTURES
+        k = options.most_textures
         if options.budget is not None:
             layers_kept = options.shapes or tiles.count
             k = textures_within(options.budget, list(neutrals.values()), layers_kept, k)
@@ -270,16 +275,18 @@ def _as_image(image, name):
 
 def _may_be_fine(options, names, keep, neutrals):
     """Whether three difference textures with finer weight maps are open, and take no more memory than four."""
-    layers = options.shapes or len(names)
-    fine, usual = (
-        memory_bytes(neutrals, k, layers, cell=cell) for k, cell in ((FINE_TEXTURES, FINE_CELL), (TEXTURES, CELL))
-    )
     free = options.method == "refined" and options.textures is None and not keep and len(names) > TEXTURES
+    layers = options.shapes or len(names)
+    try:
+        fine = memory_bytes(neutrals, FINE_TEXTURES, layers, cell=FINE_CELL)
+    except InputError:  # an atlas larger than images may be
+        return False
+    usual = memory_bytes(neutrals, TEXTURES, layers)
     return free and fine <= usual and (options.budget is None or usual <= options.budget)
 
 
 def _check(options, names, keep):
-    textures = options.textures or TEXTURES
+    textures = options.most_textures
     if options.method not in ("refined", "paper", "pca"):
         raise ValueError(f"method {options.method!r}: refined, paper or pca")
     if not 1 <= textures <= 8:

@@ -326,6 +326,7 @@ def test_bad_input_ends_in_exit_code_2_and_leaves_nothing(tmp_path, command, cap
         (["--budget", "lots"], "is no size"),
         (["--masks", "0"], "at least 1"),
         (["--textures", "9"], "1 to 8"),
+        (["--textures", "0"], "1 to 8"),
         (["--budget", "1e999"], "is no size"),
         (["--also", "color", "x", "y"], "a name of its own"),
         (["--also", "co/lor", "x", "y", "--also", "co lor", "x", "y"], "a name of its own"),
