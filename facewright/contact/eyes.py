@@ -112,7 +112,7 @@ class _Eye:
         side = self.side.capitalize()
         made = {self.blink: (self._blink, _BLINK_STEPS), f"eyeWide{side}": (self._wide, (HALF, 1.0))}
         found = {
-            name: {weight: self._full(make(weight)) for weight in weights}
+            name: {weight: self._full(make(weight), shut=name == self.blink and weight == 1.0) for weight in weights}
             for name, (make, weights) in made.items()
             if name in names
         }
@@ -148,7 +148,7 @@ class _Eye:
             open_u, open_l = self.lids.opening(closed)
             slides = self.lids.slides(closed)
             closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball, slides)
-        return self._full(self.lids.joined(closed, ball), pose, ball)
+        return self._full(self.lids.joined(closed, ball), pose, ball, shut=True)
 
     def _turned_both(self, direction, ball):
         """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
@@ -223,10 +223,11 @@ class _Eye:
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
         return self.lids.turned(pose, upper, lower, ball)
 
-    def _full(self, pose, base=None, ball=None):
-        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose, over the ball as it lies."""
+    def _full(self, pose, base=None, ball=None, shut=False):
+        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose, over the ball as it lies;
+        shut: the lids are."""
         delta = np.zeros(self.face.vertices.shape)
-        delta[self.skin] = self.lids.settled(pose, ball) - (self.V if base is None else base)
+        delta[self.skin] = self.lids.settled(pose, ball, shut) - (self.V if base is None else base)
         delta[max_norms(delta) < 1e-4] = 0.0
         return delta
 

@@ -14,7 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from facewright.contact.rims import LidRims
+from facewright.contact.axes import EyeAxes
+from facewright.contact.meeting import Meeting, along_line
+from facewright.contact.rims import FirmRims, from_ends
 from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.folds import laid_flat
 from facewright.mesh.spread import SmoothSpread
@@ -26,6 +28,7 @@ _CORNER_MM = 6.0  # around a canthus the field is evened out
 _SETTLINGS = 3
 _ENDS_MM = 4.0  # of the closing line, over which it rises to the canthi
 _FAR_MM = 2.0
+_LAP_MM = 0.06  # by which the upper margin lies before the lower one when they are shut
 _WAVES = 2  # of the closing line between the canthi
 _RADIUS_ROUNDS = 8
 
@@ -61,7 +64,8 @@ class Lids:
         self.options = options or LidMotionOptions()
         self.upper, self.lower = np.asarray(upper), np.asarray(lower)
         self.free = free
-        self.axis, self.forward, self.up = _frame(vertices[self.upper], vertices[self.lower], ball.center)
+        self.axes = EyeAxes.of(vertices[self.upper], vertices[self.lower], ball.center)
+        self.axis = self.axes.axis
         self.margin = np.unique(np.concatenate([self.upper, self.lower]))
         self.canthi = np.intersect1d(self.upper, self.lower)
         self.skin = np.flatnonzero(outer & free)
@@ -73,23 +77,23 @@ class Lids:
         self._corner = np.isin(self.skin, self.canthi)
         self._corners = None
         self._near_faces = faces[free[faces].any(axis=1)]
-        self._rims = LidRims(vertices, faces[outer[faces].all(axis=1)], self.upper, self.lower, ball.center)
+        self._met = Meeting(vertices, faces, outer, self.upper, self.lower, self.axes)
+        self._firm = FirmRims(vertices, self._met.sides, (self.upper, self.lower), ball.center)
         self._spread = SmoothSpread(vertices, faces, self.margin, free, self.options.reach_mm)
         self._ease = free.astype(float)
         self._ease[self.margin] = 0.0
 
     def angles(self, points):
         """(k,) radians of elevation of points (k, 3) about the axis, 0 straight ahead."""
-        offset = points - self.ball.center
-        return np.arctan2(offset @ self.up, offset @ self.forward)
+        return self.axes.angles(points)
 
     def opening(self, pose):
         """(u,), (l,) radians by which each upper margin point stands above the lower margin and each lower point below
         the upper one, at the same place along the axis, in a pose (n, 3)."""
         at = pose @ self.axis
         theta_u, theta_l = self.angles(pose[self.upper]), self.angles(pose[self.lower])
-        below = _along(at[self.upper], at[self.lower], theta_l)
-        above = _along(at[self.lower], at[self.upper], theta_u)
+        below = along_line(at[self.upper], at[self.lower], theta_l)
+        above = along_line(at[self.lower], at[self.upper], theta_u)
         return theta_u - below, above - theta_l
 
     def closing(self, pose, slides):
@@ -104,7 +108,7 @@ class Lids:
         theta_ends = self.angles(pose[ends])[np.argsort(at[ends])][[0, -1]]
         theta_u, theta_l = self.angles(pose[self.upper]), self.angles(pose[self.lower])
         places = np.linspace(start, stop, 65)[1:-1]
-        above, below = _along(places, at[self.upper], theta_u), _along(places, at[self.lower], theta_l)
+        above, below = along_line(places, at[self.upper], theta_u), along_line(places, at[self.lower], theta_l)
         share = self.options.upper_share
         u = (places - start) / (stop - start)
         rise = (1.0 - share) * above + share * below - np.interp(u, [0, 1], theta_ends)
@@ -145,7 +149,7 @@ class Lids:
         turns = self.field(upper_turn, lower_turn)
         if slides is not None:
             pose = pose + self.field(*slides)[:, None] * self.axis
-        return self.lifted(self.rotated(pose, turns), ball, passing_mm)
+        return self.lifted(self.axes.turned(pose, turns), ball, passing_mm)
 
     def field(self, upper, lower):
         """(n,) values given on the margins, 0 at the canthi, spread over the skin around."""
@@ -173,23 +177,17 @@ class Lids:
         result[inside] = factor.solve(-(rest @ field[~inside]))
         return result
 
-    def settled(self, pose, ball=None):
+    def settled(self, pose, ball=None, shut=False):
         """The pose (n, 3) without folded faces: where the corners press skin together it gives way, but not into the
-        ball."""
+        ball, nor, where the lids are shut, into the other lid."""
         for _ in range(_SETTLINGS):
             flat = laid_flat(self.V, pose, self._near_faces, self._ease)
             if flat is pose:
                 break
             pose = self.lifted(flat, ball)
+            if shut:
+                pose = self._met(pose, unfolded=True)
         return pose
-
-    def rotated(self, pose, field):
-        """The pose (n, 3) with each vertex turned by its angle (n,) about the axis; positive raises what is ahead."""
-        offset = pose - self.ball.center
-        c, s = np.cos(field)[:, None], np.sin(field)[:, None]
-        axis = -self.axis
-        along = (offset @ axis)[:, None] * axis
-        return self.ball.center + along + c * (offset - along) + s * np.cross(axis, offset)
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
         """The pose (n, 3) with its lid skin lifted off the ball where it is nearer than it should be.
@@ -220,22 +218,17 @@ class Lids:
         """
         ball = ball or self.ball
         moves = []
-        for line, slide in zip((self.upper, self.lower), self.slides(pose)):
+        for line, slide, sign in zip((self.upper, self.lower), self.slides(pose), (0.5, -0.5)):
             along, theta = pose[line] @ self.axis - ball.center @ self.axis + slide, self.angles(pose[line])
-            spokes = np.cos(theta)[:, None] * self.forward + np.sin(theta)[:, None] * self.up
+            spokes = np.cos(theta)[:, None] * self.axes.forward + np.sin(theta)[:, None] * self.axes.up
             points = pose[line]
             for _ in range(_RADIUS_ROUNDS):  # the radius is asked where the point comes to lie
-                radius = np.maximum(self._closed_radius(points, pose[self.canthi], ball), np.abs(along) + 1e-3)
+                radius = self._closed_radius(points, pose[self.canthi], ball) + sign * _LAP_MM * from_ends(self.V[line])
+                radius = np.maximum(radius, np.abs(along) + 1e-3)
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self._met(self._rims.firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
-
-    def _met(self, pose):
-        """The pose (n, 3) of closed lids whose rims lie on each other."""
-        offset = pose - self.ball.center
-        radius = np.hypot(offset @ self.up, offset @ self.forward)
-        return self.rotated(pose, self._rims.turns(offset @ self.axis, radius, self.angles(pose)))
+        return self._met(self._firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
 
     def _closed_radius(self, points, canthi, ball):
         """(k,) distance from the centre that closed margins have at points (k, 3)."""
@@ -245,20 +238,3 @@ class Lids:
             share = np.clip(1.0 - np.linalg.norm(points - canthus, axis=1) / _ENDS_MM, 0.0, 1.0)
             radius = radius + beyond * share * share * (3.0 - 2.0 * share)
         return radius
-
-
-def _frame(upper, lower, center):
-    """Unit axis (towards +X), forward and up of an eye: the axis from canthus to canthus."""
-    ends = np.array([0.5 * (upper[0] + lower[0]), 0.5 * (upper[-1] + lower[-1])])
-    axis = ends[1] - ends[0] if ends[1, 0] > ends[0, 0] else ends[0] - ends[1]
-    axis = axis / np.linalg.norm(axis)
-    middle = np.concatenate([upper, lower]).mean(axis=0) - center
-    forward = middle - (middle @ axis) * axis
-    forward /= np.linalg.norm(forward)
-    return axis, forward, np.cross(forward, axis)
-
-
-def _along(wanted, places, values):
-    """Values (k,) at places along the axis, read at wanted; flat beyond the ends."""
-    order = np.argsort(places)
-    return np.interp(wanted, places[order], values[order])

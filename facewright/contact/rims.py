@@ -5,59 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.mesh.normals import normalized
-from facewright.mesh.seam import seam_sides
 
-_REACH_MM = 8.0  # over the skin from the margins: what the other lid may meet
-_GAP_MM = 0.07  # left between two rims
-_MARGIN_GAP_MM = 0.03  # between their inner edges, which have been joined but for the chords of their own vertices
 _ENDS_MM = 2.0  # from a canthus: there it sets in
-_DEEPEST_MM = 4.0
-_ROUNDS = 3
-_NO_AREA = 1e-12
 _LEAN = np.radians(30.0)  # over its margin, of the rim of a shut lid
 _FIRM_MM, _SOFT_MM = 1.2, 2.8  # from the margin: so far a lid keeps its form whole, and not at all
-
-
-class LidRims:
-    """The outer skin of the two lids of one eye, next to their margins.
-
-    vertices (n, 3) mm at rest, faces (m, 3) of the outer skin; upper, lower: margin vertices from canthus to canthus;
-    center (3,) of the eye. firm: FirmRims of them
-    """
-
-    def __init__(self, vertices, faces, upper, lower, center):
-        sides = seam_sides(vertices, faces, upper, lower, _REACH_MM)
-        margins = np.zeros(len(vertices), bool)
-        margins[upper] = margins[lower] = True
-        self.sides = [np.flatnonzero(side & ~margins) for side in sides]
-        self.firm = FirmRims(vertices, [side & ~margins for side in sides], (upper, lower), center)
-        self.patches = []
-        for side, line in zip(sides, (upper, lower)):
-            mine = side.copy()
-            mine[line] = True
-            self.patches.append(faces[mine[faces].all(axis=1)])
-        self._margins = [(line, sign * _from_ends(vertices[line])) for line, sign in ((upper, 0.5), (lower, -0.5))]
-
-    def turns(self, along, radius, angle):
-        """(n,) radians by which vertices turn about the eye's axis so that no rim lies in the other one.
-
-        along, radius (n,) mm along the axis and from it; angle (n,) radians about it, growing upwards. Both lids give
-        way half and half, to the surface midway between them. It ends at the line where they meet in front, so hardly
-        anything moves that is seen.
-        """
-        place, turned = np.stack([along, radius], axis=1), np.array(angle)
-        for line, share in self._margins:
-            turned[line] += share * _MARGIN_GAP_MM / radius[line]
-        for _ in range(_ROUNDS):
-            turns = []
-            for mine, patch, sign in zip(self.sides, self.patches[::-1], (1.0, -1.0)):
-                over = _highest(place[mine], place, sign * turned, patch) - sign * turned[mine]
-                depth = over * radius[mine] + _GAP_MM
-                moves = (depth > 0.0) & (depth < _DEEPEST_MM)
-                turns.append(np.where(moves, 0.5 * sign * depth / radius[mine], 0.0))
-            for mine, turn in zip(self.sides, turns):
-                turned[mine] += turn
-        return turned - angle
 
 
 class FirmRims:
@@ -127,33 +78,7 @@ def _hung(vertices, side, line):
     return side[hangs], nearest[hangs], share[k, nearest][hangs], weight
 
 
-def _from_ends(chain):
+def from_ends(chain):
     """(k,) 0 at the ends of a chain of points (k, 3), 1 from _ENDS_MM on."""
     steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
     return np.clip(np.minimum(steps, steps[-1] - steps) / _ENDS_MM, 0.0, 1.0)
-
-
-def _highest(points, place, height, faces):
-    """(k,) greatest height of the faces over points (k, 2); -inf where none lies.
-
-    place (n, 2), height (n,) of vertices; faces (m, 3)
-    """
-    corners = place[faces]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    near = (points[:, None, 0] >= low[:, 0]) & (points[:, None, 0] <= high[:, 0])
-    near &= (points[:, None, 1] >= low[:, 1]) & (points[:, None, 1] <= high[:, 1])
-    who, face = np.nonzero(near)
-    a, b, c = (corners[face, i] for i in range(3))
-    e, f, to = b - a, c - a, points[who] - a
-    area = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
-    flat = np.abs(area) < _NO_AREA
-    area = np.where(flat, 1.0, area)
-    second = (to[:, 0] * f[:, 1] - to[:, 1] * f[:, 0]) / area
-    third = (e[:, 0] * to[:, 1] - e[:, 1] * to[:, 0]) / area
-    first = 1.0 - second - third
-    inside = ~flat & (first >= 0.0) & (second >= 0.0) & (third >= 0.0)
-    h = height[faces[face]]
-    result = np.full(len(points), -np.inf)
-    found = first * h[:, 0] + second * h[:, 1] + third * h[:, 2]
-    np.maximum.at(result, who[inside], found[inside])
-    return result

@@ -26,11 +26,11 @@ def folded_by_shape(neutral, moved, faces, mask=None):
     asked = asked[turned]
     if not len(asked):
         return asked
-    expected = _expected_normals(neutral, moved, faces, asked)
+    expected = expected_normals(neutral, moved, faces, asked)
     return asked[dot(expected, face_normals(moved, faces[asked])) < 0]
 
 
-def _expected_normals(neutral, moved, faces, asked):
+def expected_normals(neutral, moved, faces, asked):
     """(k, 3) normals of the faces `asked` at rest, turned as what is around each has turned."""
     touched = np.zeros(len(neutral), bool)
     touched[faces[asked]] = True
@@ -77,7 +77,7 @@ def laid_flat(neutral, moved, faces, mobility, *, rounds=12):
     edge, least = float(np.sqrt(2.0 * area.mean())), _LEAST_SHARE * area
     now, best, fewest = start, start, len(folded)
     for _ in range(rounds):
-        normals = _expected_normals(rest, now, local, asked)
+        normals = expected_normals(rest, now, local, asked)
         for _ in range(_SWEEPS):
             way = _way_back(now, local[asked], normals, least, ease)
             if way is None:

@@ -30,7 +30,7 @@ def _corners_over(p, q):
     """Places where a corner of one triangle lies over the other, p, q (k, 3, 2): barycentric (k, 6, 3) of both and
     (k, 6) bool: so it does."""
     corner = np.broadcast_to(np.eye(3), (len(p), 3, 3))
-    of_q, of_p = _barycentric(q, p), _barycentric(p, q)
+    of_q, of_p = barycentric(q, p), barycentric(p, q)
     at, there = np.stack([corner, of_p], axis=2), np.stack([of_q, corner], axis=2)
     inside = np.minimum(at, there).min(axis=3) >= -_ON_EDGE
     return at.reshape(-1, 6, 3), there.reshape(-1, 6, 3), inside.reshape(-1, 6)
@@ -39,7 +39,7 @@ def _corners_over(p, q):
 def _edges_over(p, q):
     """The same where edges of the two pass each other: (k, 9, 3) twice and (k, 9)."""
     i, j = np.divmod(np.arange(9), 3)
-    t, s = _where_edges_pass(p[:, i], p[:, i - 2], q[:, j], q[:, j - 2])
+    t, s = where_edges_pass(p[:, i], p[:, i - 2], q[:, j], q[:, j - 2])
     at, there = np.zeros((len(p), 9, 3)), np.zeros((len(p), 9, 3))
     edge = np.arange(9)
     at[:, edge, i], at[:, edge, i - 2] = 1.0 - t, t
@@ -84,7 +84,7 @@ def _cross(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _barycentric(triangle, points):
+def barycentric(triangle, points):
     """(k, c, 3) of points (k, c, 2) in triangles (k, 3, 2); those of no area hold nothing."""
     a = triangle[:, :1]
     e, f, to = triangle[:, 1:2] - a, triangle[:, 2:] - a, points - a
@@ -95,7 +95,7 @@ def _barycentric(triangle, points):
     return np.where(flat[..., None], -1.0, np.stack([1.0 - second - third, second, third], axis=-1))
 
 
-def _where_edges_pass(a, b, c, d):
+def where_edges_pass(a, b, c, d):
     """Shares (...), (...) of edges a-b and c-d (..., 2) at which they pass each other; -1 where they are parallel."""
     r, s, to = b - a, d - c, c - a
     turn = _cross(r, s)

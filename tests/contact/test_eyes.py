@@ -71,9 +71,12 @@ def test_left_is_the_mirror_of_right(hm08, solved):
             assert np.abs(delta - other[hm08.mirror] * [-1, 1, 1]).max() < 0.01, name
 
 
-def test_only_the_lids_move(hm08, solved):
+def test_only_the_lids_move_and_the_ball_draws_back_as_one(hm08, solved):
     face, eyes = solved[0]
-    moved = np.abs(eyes.deltas[hm08.shape_names.index("eyeBlinkLeft")]).max(axis=1) > 1e-4
+    blink, ball = eyes.deltas[hm08.shape_names.index("eyeBlinkLeft")], hm08.part("eye_left").vertex_slice
+    assert (blink[ball] == blink[ball][0]).all() and not blink[ball][:, :2].any() and -1.0 < blink[ball][0, 2] <= 0.0
+    moved = np.abs(blink).max(axis=1) > 1e-4
+    moved[ball] = False
     margin = face.vertices[np.concatenate([face.lines["lid_upper_left"], face.lines["lid_lower_left"]])]
     distance = np.linalg.norm(face.vertices[moved][:, None] - margin[None], axis=2).min(axis=1)
-    assert distance.max() < 30 and not moved[hm08.part("eye_left").vertex_slice].any()
+    assert distance.max() < 30

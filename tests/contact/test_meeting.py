@@ -1,0 +1,78 @@
+"""Shut lids lie on each other without crossing."""
+
+import numpy as np
+import pytest
+
+from facewright.contact.axes import EyeAxes
+from facewright.contact.meeting import Meeting
+from facewright.mesh.folds import folded_by_shape
+from facewright.mesh.intersect import self_intersections
+
+FAR = 12.5
+
+
+def eye(open_deg, bulge_mm):
+    """Two lids over a ball, each a rim that bulges towards the other one and skin above it, open by so much: vertices
+    (n, 3), faces, margins."""
+    along, arc = np.meshgrid(np.linspace(-8.0, 8.0, 25), np.linspace(0.0, 1.0, 13))
+    index = np.arange(along.size).reshape(along.shape)
+    a, b, c, d = (index[i : 12 + i, j : 24 + j].ravel() for i, j in ((0, 0), (0, 1), (1, 1), (1, 0)))
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    gap = np.radians(open_deg) * np.cos(np.pi * along / 17.0)
+    radius = FAR + np.minimum(3.0 * arc, 1.5)
+    rise = np.maximum(arc - 0.5, 0.0) * 0.6 - bulge_mm / FAR * np.sin(np.pi * np.minimum(2.0 * arc, 1.0))
+    lids = []
+    for sign in (1.0, -1.0):
+        angle = sign * (0.5 * gap + rise)
+        lids.append(np.stack([along, radius * np.sin(angle), radius * np.cos(angle)], axis=-1).reshape(-1, 3))
+    n = along.size
+    return np.concatenate(lids), np.concatenate([faces, faces[:, ::-1] + n]), (index[0], index[0] + n)
+
+
+def turned(vertices, sign, radians, axes):
+    """The upper lid down and the lower one up, each by radians (n,)."""
+    return axes.turned(vertices, -sign * radians)
+
+
+@pytest.fixture(scope="module")
+def shut():
+    """An eye, its Meeting and its pose with both margins on one line, where rims lie in each other."""
+    V, faces, margins = eye(40.0, 0.4)
+    axes = EyeAxes.of(V[margins[0]], V[margins[1]], np.zeros(3))
+    meeting = Meeting(V, faces, np.ones(len(V), bool), *margins, axes)
+    sign = np.where(np.arange(len(V)) < len(V) // 2, 1.0, -1.0)
+    half = 0.5 * np.radians(40.0) * np.cos(np.pi * V[:, 0] / 17.0)
+    return V, faces, margins, meeting, turned(V, sign, half, axes), axes
+
+
+def test_shut_lids_do_not_cross(shut):
+    V, faces, _, meeting, pose, _ = shut
+    assert len(self_intersections(pose, faces)) > 50
+    met = meeting(pose)
+    assert len(self_intersections(met, faces)) == 0
+    assert not len(folded_by_shape(V, met, faces))
+
+
+def test_margins_hardly_move(shut):
+    _, _, margins, meeting, pose, _ = shut
+    way = np.linalg.norm(meeting(pose) - pose, axis=1)
+    assert way[np.concatenate(margins)].max() < 0.05 < 0.3 < way.max()
+
+
+def test_both_lids_give_way_alike(shut):
+    _, _, _, meeting, pose, axes = shut
+    turn = axes.angles(meeting(pose)) - axes.angles(pose)
+    n = len(pose) // 2
+    assert np.allclose(turn[:n], -turn[n:], atol=0.02 / FAR)
+
+
+def test_distances_along_and_from_the_axis_stay(shut):
+    _, _, _, meeting, pose, axes = shut
+    before, after = axes.cylindrical(pose), axes.cylindrical(meeting(pose))
+    assert np.allclose(before[0], after[0], atol=1e-9) and np.allclose(before[1], after[1], atol=1e-9)
+
+
+def test_lids_that_meet_already_stay(shut):
+    *_, meeting, pose, _ = shut
+    met = meeting(pose)
+    assert np.linalg.norm(meeting(met) - met, axis=1).max() < 0.02
