@@ -14,6 +14,7 @@ from facewright.contact.targets import is_even
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
 from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR
 from facewright.mesh.adjacency import differing
+from facewright.mesh.seam import seam_sides
 from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
@@ -56,10 +57,12 @@ class _Crossings:
             if name.startswith("lid_"):
                 farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=reach)[0] < reach
-        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
+        seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
+        lips = seam_sides(self.V, faces, *seams, _REACH_MM["lip_seam"], split_ends=False)
+        self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest, lips)
         if "jawOpen" in targets.names:
             near |= np.abs(targets.delta("jawOpen")[self.at]).max(axis=1) > _MOVES_MM
-        self.wide = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest)
+        self.wide = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest, lips)
         self.halves = read_working_set().halves(targets.names)
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]

@@ -3,8 +3,9 @@
 Contact asks vertices, and stops at a depth that nobody sees; edges of the small faces at a corner of the mouth and in
 shut lids still pass through each other. Here the pairs of faces that cross are found exactly and moved apart along the
 normals between them, as far as they reach past each other (position-based constraints: Mueller et al. 2007), until none
-crosses. Which of two sheets belongs in front is told by the winding number: between skins that meet it is that of flesh
-on either side of the crossing; between a skin and its own lining, turned inside out, that of air.
+crosses. Which of two sheets belongs in front is known of an upper lip and a lower one. Else it is told by the winding
+number: between skins that meet it is that of flesh on either side of the crossing; between a skin and its own lining,
+turned inside out, that of air. Asked of lips too, a thin one that has crumpled is sent through the other.
 """
 
 from __future__ import annotations
@@ -54,14 +55,16 @@ class Parting:
 
     vertices (n, 3) mm at rest, faces (m, 3); near (m,) bool: faces that may cross; asked (m,) bool: one of a pair
     farthest (n,) mm by which vertices are moved at most
+    sides    two (n,) bool: an upper and a lower lip; one meets the other, but is no lining of it
     """
 
-    def __init__(self, vertices, faces, near, asked, farthest, options=None):
+    def __init__(self, vertices, faces, near, asked, farthest, sides=(), options=None):
         self.options = options or PartingOptions()
         self.used, local = np.unique(faces[near], return_inverse=True)
         self.faces = np.ascontiguousarray(local.reshape(-1, 3))
         self.rest, self.asked, self._n = vertices[self.used], asked[near], len(vertices)
         self._farthest = farthest[self.used, None]
+        self._sides = [side[self.used][self.faces].all(axis=1) for side in sides]
         self._before = self._keys(self_intersections(self.rest, self.faces))
         # What is left out here would close these faces: in front of the skin at rest there is no flesh.
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
@@ -162,22 +165,32 @@ class Parting:
     def _senses(self, now, pose):
         """(k,) of all pairs met: 1 where two skins meet, -1 where a skin has come through its own lining.
 
-        Pairs that hang together are one crossing and decide together, the first ones for all that come later. Where one
-        way out is much shorter than the other it is taken; else flesh decides.
+        Lips meet each other. Else pairs that hang together are one crossing and decide together, the first ones for all
+        that come later. Where one way out is much shorter than the other it is taken; else flesh decides.
         """
-        known, corners = len(pose.senses), pose.met.ravel()
-        _, ends = np.unique(corners, return_inverse=True)
+        senses = np.ones(len(pose.met))
+        senses[: len(pose.senses)] = pose.senses
+        other = np.flatnonzero(~self._across(pose.met))
+        known = np.searchsorted(other, len(pose.senses))
+        if known == len(other):
+            return senses
+        _, ends = np.unique(pose.met[other].ravel(), return_inverse=True)
         a, b = ends.reshape(-1, 2).T
         count = ends.max() + 1
         links = sp.coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
         label = connected_components(links, directed=False)[1][a]
         votes = np.zeros(count)
-        np.add.at(votes, label[:known], pose.senses)
+        np.add.at(votes, label[:known], senses[other[:known]])
         new = np.flatnonzero(votes[label[known:]] == 0.0)
-        pairs, mine = pose.met[known:][new], label[known:][new]
         if len(new):
-            votes += self._votes(now, pairs, mine, count)
-        return np.append(pose.senses, np.where(votes > 0.0, 1.0, -1.0)[label[known:]])
+            votes += self._votes(now, pose.met[other[known:][new]], label[known:][new], count)
+        senses[other[known:]] = np.where(votes > 0.0, 1.0, -1.0)[label[known:]]
+        return senses
+
+    def _across(self, pairs):
+        """(k,) bool of pairs (k, 2): one face of each side."""
+        ways = zip(self._sides, self._sides[::-1])
+        return sum((one[pairs[:, 0]] & other[pairs[:, 1]] for one, other in ways), np.zeros(len(pairs), bool))
 
     def _votes(self, now, pairs, label, count):
         """(count,) of each crossing: more than 0 where its pairs (k, 2), labelled (k,), are skins that meet."""

@@ -90,3 +90,19 @@ def test_nothing_is_parted_into_what_is_solid(pads, parting):
     field = parting([pose], [1.0], [down])
     assert (pose + field)[:, 2].max() <= top + 1e-6
     assert not len(self_intersections(pose + field, F))
+
+
+def test_a_thin_lip_goes_back_where_it_came_from(pads):
+    """Deeper in the other than it is thick: its far side is the nearer way out, and flesh says nothing of it."""
+    V, F, upper = pads
+    thin = V.copy()
+    thin[V[:, 2] == -4.0, 2] = -1.15
+    pose = pressed((thin, F, upper), 0.3)
+    assert len(self_intersections(pose, F))
+    every, farthest = np.ones(len(F), bool), np.full(len(V), 0.5)
+    parting = Parting(thin, F, every, every, farthest, (upper, ~upper))
+    parted = pose + parting([pose], [1.0], [np.zeros_like])
+    assert not len(self_intersections(parted, F))
+    middle = np.abs(V[:, :2]).max(axis=1) < 2.0
+    assert parted[upper & middle, 2].min() > parted[~upper & middle, 2].max() - 0.05
+    assert (parted[V[:, 2] == -1.0, 2] > parted[V[:, 2] == -4.0, 2]).all()  # not turned inside out
