@@ -21,6 +21,7 @@ from facewright.working_set import read_working_set
 
 _REACH_MM = {"lip_seam": 25.0, "lid_": 10.0, "nostril": 14.0}  # from these lines: skin that may come to cross
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
+_CORNER_MM = 1.0  # of the lips' line: skin and lining nearest to it may cross as one turned inside out
 _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
 _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
 
@@ -57,8 +58,7 @@ class _Crossings:
             if name.startswith("lid_"):
                 farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=reach)[0] < reach
-        seams = face.lines["lip_seam_upper"], face.lines["lip_seam_lower"]
-        lips = seam_sides(self.V, faces, *seams, _REACH_MM["lip_seam"], split_ends=False)
+        lips = self._lips(face, faces)
         self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest, lips)
         if "jawOpen" in targets.names:
             near |= np.abs(targets.delta("jawOpen")[self.at]).max(axis=1) > _MOVES_MM
@@ -66,6 +66,14 @@ class _Crossings:
         self.halves = read_working_set().halves(targets.names)
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]
+
+    def _lips(self, face, faces):
+        """Two (k,) bool of the skin: what lies by the upper lip and by the lower one, rather than by a corner."""
+        seams = [face.lines[f"lip_seam_{lip}"] for lip in ("upper", "lower")]
+        seam = self.V[np.concatenate(seams)]
+        from_corner = cKDTree(self.V[seams[0][[0, -1]]]).query(seam)[0]
+        inner = from_corner[cKDTree(seam).query(self.V)[1]] > _CORNER_MM
+        return [side & inner for side in seam_sides(self.V, faces, *seams, _REACH_MM["lip_seam"], split_ends=False)]
 
     def _apart(self, motions, acts):
         """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say."""

@@ -32,6 +32,7 @@ _NOTHING_MM = 1e-4
 _TRUSTED_MM = 1.0  # of a clearance: a lip ends, and farther off a vertex gets behind it without passing through it
 _STEPS = np.linspace(0.2, 1.0, 5)  # of a way on which teeth are looked for
 _LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
+_ALL_ASKED = 3  # of so many rounds the way is asked as a whole in one
 _LEAST_SLOPE = 0.1  # of the lips' lines towards each other at a corner: there they are as near as they are to it
 
 
@@ -44,6 +45,7 @@ class LipOptions:
     tie_mm   width of bending up to which the two sides of a lip move as one, tied_mm from the seam on they do not: what
              teeth push there would bulge the skin
     touch_mm contact less deep than this is none
+    ajar_mm  a slit that is nowhere so high is left as it is where lips give way to each other
     teeth_mm how deep in a tooth skin may stay that is there at rest
     off_mm   how far before the teeth skin lies that was pushed out: their edges would stand out between its vertices
     weights  of a shape at which its contact is solved
@@ -58,6 +60,7 @@ class LipOptions:
     touch_mm: float = 0.15
     gap_mm: float = 0.05
     rest_mm: float = 0.1
+    ajar_mm: float = 0.2
     teeth_mm: float = 0.1
     off_mm: float = 0.3
     weights: tuple[float, ...] = (0.2, 0.4, 0.6, 0.8, 1.0)
@@ -157,8 +160,8 @@ class LipContact:
         poses = {weight: self.V + motion(weight) for weight in way}
         asked, left, watches, last = way[:1], dict.fromkeys(way, np.inf), {}, self._at_rest
         solved = {}  # the field with which a pose was asked last
-        best, least = field, np.inf  # rounds may swing where lips and teeth both push
-        for width in (*(_LOCAL_MM if closed else self.options.smooth_mm), None):
+        best, of_best = field, {}  # rounds may swing where lips and teeth both push
+        for step, width in enumerate((*(_LOCAL_MM if closed else self.options.smooth_mm), None)):
             total, most, met = np.zeros_like(field), np.zeros(len(field)), []
             for weight in asked:
                 share = acts(weight) if acts else weight
@@ -177,13 +180,17 @@ class LipContact:
                 hold = np.maximum(hold, heeded)
                 if more.any():
                     met.append(weight)
-            if max(left.values()) <= least:
-                best, least = field, max(left.values())
+            # Where a field was not asked about it counts with what was found there last.
+            found = {weight: left[weight] for weight in asked}
+            if field is best:
+                of_best = of_best | found
+            elif max(left.values()) <= max((left | of_best).values()):
+                best, of_best = field, found
             if met and width is not None:
                 field = self.spread(field + total, _PIN * hold, width)
-            # What was free stays unasked until the rest is free: most of a path never touches.
+            # What was free stays unasked for some rounds, or until the rest is free: most of a path never touches.
             stale = [weight for weight in way[: len(solved) + 1] if solved.get(weight) is not field]
-            asked = met if met and len(solved) == len(way) else stale
+            asked = met if met and len(solved) == len(way) and step % _ALL_ASKED else stale
             if not asked:
                 break
         return self._of_head(best)
@@ -255,6 +262,8 @@ class LipContact:
     def _add_shutting(self, skin, wishes, counts):
         """Add, in place, what shuts the slit where no lip has met anything else."""
         lift, over = self.slit.wishes(skin)
+        if over.max() < self.options.ajar_mm:
+            return
         more = (over > 0.0) & (counts == 0.0)
         wishes[more], counts[more] = lift[more], 1.0
 

@@ -35,6 +35,8 @@ class PartingOptions:
     most_mm   by which a pair is moved at once
     aside_mm  from a crossing: there flesh is asked for
     opposed   length of the difference of two normals from which on it says along which way faces part
+    rings     of faces around a vertex of a lip whose normals count as its own where it parts from the other lip
+    across    length of the difference of two such normals from which on lips may also part along one of the two
     shorter   share of the other way out at which one is taken whatever lies there
     least_act where the correction acts less it is taken to act so much, or it would grow large for the rest
     patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
@@ -44,6 +46,8 @@ class PartingOptions:
     most_mm: float = 0.15
     aside_mm: float = 0.005
     opposed: float = 0.2
+    rings: int = 10
+    across: float = 0.6
     shorter: float = 1 / 3
     least_act: float = 0.25
     patience: int = 6
@@ -64,7 +68,10 @@ class Parting:
         self.faces = np.ascontiguousarray(local.reshape(-1, 3))
         self.rest, self.asked, self._n = vertices[self.used], asked[near], len(vertices)
         self._farthest = farthest[self.used, None]
-        self._sides = [side[self.used][self.faces].all(axis=1) for side in sides]
+        self._ring = _mean_of_ring(self.faces, len(self.used))
+        self._side = np.zeros(len(self.faces), int)  # 1 and 2 for faces of the two sides
+        for number, side in enumerate(sides, start=1):
+            self._side[side[self.used][self.faces].all(axis=1)] = number
         self._before = self._keys(self_intersections(self.rest, self.faces))
         # What is left out here would close these faces: in front of the skin at rest there is no flesh.
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
@@ -151,6 +158,38 @@ class Parting:
             way[moved] = pose.way_out(pose.skin(field)[moved])
         return way / np.maximum(pose.act, self.options.least_act)
 
+    def _ways_apart(self, now, pose):
+        """(k, 3) unit ways along which the first faces of pairs met may not reach past the second ones, and (n,) which
+        of all pairs met have one."""
+        ways = self._ways(now, pose.met)
+        known = lengths(ways) > self.options.opposed
+        ways, pairs = normalized(ways[known]), pose.met[known]
+        lips = self._of_both_lips(pairs)
+        if lips.any():
+            ways[lips] = self._ways_of_lips(now, *self.faces[pairs[lips].T])
+        return ways * pose.senses[known, None], known
+
+    def _ways_of_lips(self, now, a, b):
+        """(k, 3) unit ways along which faces a (k, 3) of one lip part from faces b (k, 3) of the other: away from one
+        of the two or from both, whichever is the shortest.
+
+        The skin around says where a face looks: at the edge of a thin lip each of its sides would push the other lip
+        its own way, and a slit would open.
+        """
+        normals = vertex_normals(now, self.faces)
+        for _ in range(self.options.rings):
+            normals = self._ring @ normals
+        one, other = (normalized(normals[corners].mean(axis=1)) for corners in (a, b))
+        ways = np.stack([normalized(one - other), one, -other])
+        depths = np.array([overlap_along(now[a], now[b], way)[0] for way in ways])
+        depths[np.isneginf(depths)] = np.inf  # they do not lie over each other along it
+        depths[1:, lengths(one - other) < self.options.across] = np.inf
+        return ways[depths.argmin(axis=0), np.arange(len(a))]
+
+    def _of_both_lips(self, pairs):
+        """(k,) bool of pairs (k, 2): one face of each side."""
+        return self._side[pairs].prod(axis=1) == 2
+
     def _ways(self, now, pairs):
         """(k, 3) from the first face of each pair to the second, in the mean of what their corners look along."""
         normals = vertex_normals(now, self.faces)
@@ -165,32 +204,24 @@ class Parting:
     def _senses(self, now, pose):
         """(k,) of all pairs met: 1 where two skins meet, -1 where a skin has come through its own lining.
 
-        Lips meet each other. Else pairs that hang together are one crossing and decide together, the first ones for all
-        that come later. Where one way out is much shorter than the other it is taken; else flesh decides.
+        Pairs that hang together are one crossing and decide together, lips that meet for all around them, the first
+        ones for all that come later. Where one way out is much shorter than the other it is taken; else flesh decides.
         """
-        senses = np.ones(len(pose.met))
-        senses[: len(pose.senses)] = pose.senses
-        other = np.flatnonzero(~self._across(pose.met))
-        known = np.searchsorted(other, len(pose.senses))
-        if known == len(other):
-            return senses
-        _, ends = np.unique(pose.met[other].ravel(), return_inverse=True)
+        met, (one, other) = pose.met, self._side[pose.met].T
+        senses, known = np.ones(len(met)), self._of_both_lips(met)
+        senses[: len(pose.senses)], known[: len(pose.senses)] = pose.senses, True
+        apart = len(self.faces) * ((one == other) & (one > 0))  # a lip in itself does not hang together with the rest
+        _, ends = np.unique(met + apart[:, None], return_inverse=True)
         a, b = ends.reshape(-1, 2).T
         count = ends.max() + 1
         links = sp.coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
         label = connected_components(links, directed=False)[1][a]
-        votes = np.zeros(count)
-        np.add.at(votes, label[:known], senses[other[:known]])
-        new = np.flatnonzero(votes[label[known:]] == 0.0)
+        votes = np.bincount(label[known], senses[known], minlength=count)
+        new = np.flatnonzero(~known & (votes[label] == 0.0))
         if len(new):
-            votes += self._votes(now, pose.met[other[known:][new]], label[known:][new], count)
-        senses[other[known:]] = np.where(votes > 0.0, 1.0, -1.0)[label[known:]]
+            votes = votes + self._votes(now, met[new], label[new], count)
+        senses[~known] = np.where(votes > 0.0, 1.0, -1.0)[label[~known]]
         return senses
-
-    def _across(self, pairs):
-        """(k,) bool of pairs (k, 2): one face of each side."""
-        ways = zip(self._sides, self._sides[::-1])
-        return sum((one[pairs[:, 0]] & other[pairs[:, 1]] for one, other in ways), np.zeros(len(pairs), bool))
 
     def _votes(self, now, pairs, label, count):
         """(count,) of each crossing: more than 0 where its pairs (k, 2), labelled (k,), are skins that meet."""
@@ -211,10 +242,8 @@ class Parting:
         start = now = pose.skin(field)
         if not len(pose.pairs):
             return np.zeros_like(field)
-        ways = self._ways(now, pose.met)
-        known = lengths(ways) > self.options.opposed
+        ways, known = self._ways_apart(now, pose)
         a, b = self.faces[pose.met[known].T]
-        ways = normalized(ways[known]) * pose.senses[known, None]
         for _ in range(self.options.sweeps):
             depth, at, there = overlap_along(now[a], now[b], ways)
             hit = depth > -self.options.gap_mm
@@ -231,6 +260,13 @@ class Parting:
             np.add.at(count, corners, share)
             now = now + total / np.maximum(count, 1.0)[:, None]
         return (now - start) / np.maximum(pose.act, self.options.least_act)
+
+
+def _mean_of_ring(faces, n):
+    """(n, n) csr that takes the mean over the faces (m, 3) around each vertex of the mean of their corners."""
+    corners = sp.coo_matrix((np.ones(faces.size), (faces.ravel(), np.arange(faces.size) // 3)), (n, len(faces))).tocsr()
+    both = corners @ corners.T
+    return sp.diags(1.0 / np.asarray(both.sum(axis=1)).ravel()) @ both
 
 
 def _within(field, farthest):
