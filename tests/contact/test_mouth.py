@@ -9,7 +9,9 @@ from facewright.contact import Targets, find_jaw, part_lips, solve_mouth
 from facewright.contact.mouth import MouthOptions, _Mouth
 from facewright.evaluate.mouth import measure_mouth
 from facewright.evaluate.quality import lip_gaps_mm
+from facewright.evaluate.synthetic import random_identity
 from facewright.parts import build_rig, fit_parts
+from facewright.rigging import unscanned_face
 from facewright.transfer import transfer_shapes
 
 KEPT = ("jawOpen", "mouthClose", "mouthPucker", "mouthFunnel", "mouthPressLeft", "mouthPressRight", "mouthShrugLower")
@@ -130,3 +132,16 @@ def test_a_roll_stops_where_the_teeth_stop_it(solved):
     rolls = Targets(("mouthRollLower",), back[None])
     assert np.allclose(mouth.with_room(rolls).deltas[0], min(1.0, mouth.contact.meets_teeth(back, 0.5) + 0.5) * back)
     assert np.array_equal(mouth.with_room(Targets(("mouthRollLower",), 0.1 * back[None])).deltas[0], 0.1 * back)
+
+
+def test_a_jaw_that_goes_forward_keeps_lips_shut_and_off_each_other_on_the_way(hm08):
+    """What shuts them at the end brings them into each other half way."""
+    person = part_lips(fit_parts(unscanned_face(hm08, random_identity(hm08, 6))))
+    raw = transfer_shapes(person)[[hm08.shape_names.index("jawForward")]]
+    targets = solve_mouth(person, Targets(("jawForward",), raw))
+    poses = {str(weight): {"jawForward": weight} for weight in (0.25, 0.5, 0.75, 1.0)}
+    found = measure_mouth(rig_of(person, targets), poses)["poses"]
+    assert max(figures["crossing_mm"][0] for figures in found.values()) < 0.3
+    contact = _Mouth(person, MouthOptions()).contact
+    pose = (person.vertices + targets.delta("jawForward"))[contact.used]
+    assert max(gaps.max() for gaps in contact.slit.gaps(pose)) < 0.3
