@@ -23,6 +23,9 @@ SCRATCH_BYTES = 3_000_000_000
 SHARED_MAY_LOSE = 0.1
 # Difference textures as published.
 TEXTURES = 4
+# Above so many bytes of textures (24 of RGB at 2048) weight maps stay at an eighth: finer ones take longer, and in
+# large images a weight texel covers little of the face anyway.
+FINE_BYTES = 24 * 3 * 2048**2
 
 
 @dataclass(frozen=True)
@@ -276,13 +279,15 @@ def _as_image(image, name):
 def _may_be_fine(options, names, keep, neutrals):
     """Whether three difference textures with finer weight maps are open, and take no more memory than four."""
     free = options.method == "refined" and options.textures is None and not keep and len(names) > TEXTURES
+    if not free or sum(image.nbytes for image in neutrals) * len(names) > FINE_BYTES:
+        return False
     layers = options.shapes or len(names)
     try:
         fine = memory_bytes(neutrals, FINE_TEXTURES, layers, cell=FINE_CELL)
     except InputError:  # an atlas larger than images may be
         return False
     usual = memory_bytes(neutrals, TEXTURES, layers)
-    return free and fine <= usual and (options.budget is None or usual <= options.budget)
+    return fine <= usual and (options.budget is None or usual <= options.budget)
 
 
 def _check(options, names, keep):

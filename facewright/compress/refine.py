@@ -29,7 +29,7 @@ RIDGE = 0.003
 # Passes: so many, and more where they are cheap: PLENTY over tiles of 64 texels times textures (0.7 seconds of two
 # cores), MOST at most, as long as one takes PAYS of the error's square. With finer cells a pass takes twice as long.
 PASSES, MOST, PLENTY, PAYS = 15, 90, 9e5, 1e-3
-FINE_PASSES, FINE_COST = 11, 2
+FINE_PASSES, FINE_COST = 8, 2
 # Passes that know how the textures will be stored.
 SETTLING = 2
 
