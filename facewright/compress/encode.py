@@ -35,9 +35,10 @@ class FacezipOptions:
     method      "refined", "paper" for the published one, or "pca" (constant weights, for comparison)
     textures    number of difference textures, 1 to 8 (paper: 2 to 5), with weight maps at an eighth; with a budget the
                 most that it may choose. None: four, or three with weight maps at a quarter, where that takes no more
-                memory (24 textures or fewer) and leaves less
+                memory and leaves less (24 textures or fewer, of 2048 x 2048 or less)
     masks       number of masks of the published method
-    iterations  passes of the refinement; None: 15, and more for small sets, as long as they pay
+    iterations  passes of the refinement; None: 15 (8 with finer weight maps), and more for small sets, as long
+                as they pay
     seed        of the samples and searches
     permute     False leaves the published permutation out (for comparison)
     budget      bytes in memory, uncompressed: the number of difference textures that fits (and, of the published
@@ -111,7 +112,8 @@ def facezip_maps(maps, names, *, share=None, options=None, progress=None, **rest
             images = [_as_image(neutral, name) for name, (neutral, _) in maps.items()]
             layers = options.shapes or len(names)
             k = textures_within(options.budget, images, layers, options.most_textures, len(maps))
-            options = options if k == TEXTURES else replace(options, textures=k)
+            if k != options.most_textures:
+                options = replace(options, textures=k)
         return {
             name: _compress({name: each}, tuple(names), options, progress, **rest)[name] for name, each in maps.items()
         }

@@ -66,6 +66,16 @@ def test_weights_are_shared_where_that_pays_only(made):
     assert packed["specular"].weights is not packed["color"].weights
 
 
+def test_maps_with_weights_of_their_own_share_the_budget(made):
+    maps = {name: (made.neutral, lambda n: made.textures[n]) for name in ("color", "specular")}
+    cells, image = 4 * 6 * 8, made.neutral.nbytes
+    for k in (2, 4):
+        budget = 2 * ((1 + k) * image + 7 * cells)
+        packed = facezip_maps(maps, made.names, share=False, options=FacezipOptions(textures=6, budget=budget))
+        assert [len(one.textures) for one in packed.values()] == [k, k]
+        assert sum(one.memory_bytes() for one in packed.values()) <= budget
+
+
 @pytest.mark.parametrize("count,rows,columns", [(1, 64, 64), (20, 64, 64), (100, 512, 512), (7, 3, 5)])
 def test_the_atlas_fits_a_graphics_card(count, rows, columns):
     across, down = atlas_shape(count, rows, columns)

@@ -13,7 +13,7 @@ from hm08.spread import spread
 LIPS_MM = 9.0  # skin so near to the seam stays as it is in mouthClose with jawOpen
 FADE_MM = 30.0
 # hm08's lower lip goes down in straight lines from the corners to the middle, a V; of the motion beyond the corners' a
-# lip has (1 - (1 - q)^2)^ROUND at the share q of the way to the middle (ICT-FaceKit's is between that of 0.85 and 1).
+# lip has (1 - (1 - q)^2)^ROUND at the share q of the way to the middle. A V has q.
 ROUND = 0.85
 LIP_MM, ROUND_FADE_MM = 7.0, 24.0
 SHARE = 0.25  # of the jaw's turn by which closed lips go down with it
