@@ -23,7 +23,6 @@ from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
 _BLINK_STEPS = 0.35, 0.7, 1.0  # a lid turns farthest; chords of a third of its way stay out of the ball
-_ROUNDS = 3
 _FULLNESS = 0.6
 _CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
 _CORNER_MM = 2.0
@@ -137,28 +136,17 @@ class _Eye:
         return [name for name in wanted if name in names]
 
     def corrective(self, blink, other, name):
-        """(n, 3) what blink and another shape lack together: margins that meet, skin off the turned ball."""
-        pose = self.V + blink[self.skin] + other[self.skin]
+        """(n, 3) what blink and another shape lack together: shut lids that go with the other shape as one."""
+        shut, motion = self.V + blink[self.skin], other[self.skin]
         direction = look_shapes(self.side).get(name)
         ball = self.ball.turned(gaze_rotation(direction, self.side)) if direction else self.ball
-        closed = self._turned_both(direction, ball) if direction else pose
-        for _ in range(_ROUNDS):
-            # The lower lid is right, it has been pushed there; the upper follows. Each round corrects what the turned
-            # margins have slid along the axis.
-            open_u, open_l = self.lids.opening(closed)
-            slides = self.lids.slides(closed)
-            closed = self.lids.turned(closed, -open_u, np.zeros_like(open_l), ball, slides)
-        return self._full(self.lids.joined(closed, ball), pose, ball, shut=True)
-
-    def _turned_both(self, direction, ball):
-        """(n, 3) the pose of a blink and a look by one turn: two chords added up would stand off the ball."""
-        # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
-        upper, lower = (
-            np.radians(turn) * profile ** (1.0 / _FULLNESS)
-            for turn, profile in zip(self.options.look_turn_deg[direction], self.profiles)
-        )
-        close_u, close_l = self._closing_turns()
-        return self.lids.turned(self.V, upper + close_u, lower + close_l, ball, self.lids.slides(self.V))
+        lower = self.lids.lower
+        if direction:
+            # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
+            turn = np.radians(self.options.look_turn_deg[direction][1]) * self.profiles[1] ** (1.0 / _FULLNESS)
+        else:
+            turn = self.lids.angles((shut + motion)[lower]) - self.lids.angles(shut[lower])
+        return self._full(self.lids.carried(shut, motion, turn, ball), shut + motion, ball, shut=True)
 
     def _closing_turns(self):
         """(u,), (l,) radians that bring both margins of the neutral to the closing line, where they will have slid."""

@@ -31,6 +31,7 @@ _FAR_MM = 2.0
 _LAP_MM = 0.06  # by which the upper margin lies before the lower one when they are shut
 _WAVES = 2  # of the closing line between the canthi
 _RADIUS_ROUNDS = 8
+_AS_ONE_MM, _ALONE_MM = 2.5, 12.0  # from the closing line: shut lids go as one with another shape, and not at all
 
 
 @dataclass(frozen=True)
@@ -229,6 +230,42 @@ class Lids:
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
         return self._met(self._firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
+
+    def carried(self, shut, motion, turn, ball=None):
+        """The pose (n, 3) of shut lids that another shape moves by motion (n, 3) besides.
+
+        turn  (l,) radians by which the shape turns the lower margin
+        What lies near the closing line is turned, shifted and raised as one, by what depends on the place along the axis
+        alone: such a map of space lets nothing pass through anything. Farther away the shape's own motion takes over.
+        """
+        ball = ball or self.ball
+        away = cKDTree(shut[self.margin]).query(shut, distance_upper_bound=_ALONE_MM)[0]
+        share = np.clip((_ALONE_MM - away) / (_ALONE_MM - _AS_ONE_MM), 0.0, 1.0)
+        share = share * share * (3.0 - 2.0 * share)
+        along = (shut - ball.center) @ self.axis
+        ends = self.lower[[0, -1]]
+        shift = np.stack([along_line(along, along[ends], motion[ends, c]) for c in range(3)], axis=1)
+        turns = self._waved(along, along[self.lower], turn)
+        line = self.axes.turned(shut, turns) + shift
+        rise = np.zeros(len(shut))
+        lower, upper = self.lower, self.upper
+        rises = []
+        for index in (lower, upper):
+            radius = self._closed_radius(line[index], line[self.canthi], ball)
+            before = self._closed_radius(shut[index], shut[self.canthi], self.ball)
+            rises.append(self._waved(along, along[index], radius - before))
+        rise = 0.5 * (rises[0] + rises[1])
+        turned = self.axes.turned(shut, share * turns) + share[:, None] * shift
+        out = turned - ball.center
+        turned = turned + out * (share * rise / np.linalg.norm(out, axis=1))[:, None]
+        return self._met(self.lifted(turned + (1.0 - share)[:, None] * motion, ball), unfolded=True)
+
+    def _waved(self, wanted, places, values):
+        """Values (k,) at places along the axis, read at wanted as a few waves from 0 at the ends."""
+        start, stop = places.min(), places.max()
+        waves = np.arange(1, _WAVES + 1)
+        height = np.linalg.lstsq(np.sin(np.pi * np.outer((places - start) / (stop - start), waves)), values, rcond=None)[0]
+        return np.sin(np.pi * np.outer(np.clip((wanted - start) / (stop - start), 0.0, 1.0), waves)) @ height
 
     def _closed_radius(self, points, canthi, ball):
         """(k,) distance from the centre that closed margins have at points (k, 3)."""
