@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.contact import (
+    EyeShapes,
     find_jaw,
     hold_neck,
     keep_jaw_within,
@@ -18,7 +19,6 @@ from facewright.contact import (
     lay_tongue,
     part_crossings,
     part_lips,
-    solve_eyes,
     solve_mouth,
 )
 from facewright.data import Face
@@ -30,8 +30,9 @@ def shapes_of(face, jobs=1):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
     carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
     carried = lay_tongue(face, keep_jaw_within(face, carried))
-    skin = solve_mouth(face, solve_eyes(face, carried), jobs=jobs)
-    return _with_riders(face, part_crossings(face, lay_flat(face, skin), jobs))
+    eyes = EyeShapes(face)
+    skin = solve_mouth(face, eyes.shapes(carried), jobs=jobs)
+    return _with_riders(face, part_crossings(face, lay_flat(face, skin), jobs, eyes.with_pairs))
 
 
 def rig_from_face(face, maps=None, jobs=1):

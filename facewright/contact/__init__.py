@@ -1,7 +1,7 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
 from facewright.contact.crossings import part_crossings
-from facewright.contact.eyes import EyeShapeOptions, solve_eyes
+from facewright.contact.eyes import EyeShapeOptions, EyeShapes, solve_eyes
 from facewright.contact.folds import lay_flat
 from facewright.contact.jaw import find_jaw, keep_jaw_within
 from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
@@ -11,6 +11,7 @@ from facewright.contact.tongue import TongueOptions, lay_tongue
 
 __all__ = [
     "EyeShapeOptions",
+    "EyeShapes",
     "MouthOptions",
     "Targets",
     "TongueOptions",

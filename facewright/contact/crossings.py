@@ -26,16 +26,17 @@ _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and nec
 _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
 
 
-def part_crossings(face, targets, jobs=1):
+def part_crossings(face, targets, jobs=1, pairs=None):
     """Targets of a data.Face in which no shape, none of its halves and no named pair has crossings of its own.
 
     What crosses in the neutral may go on doing so; where little can be moved a few pairs of faces are left.
     Corrections of pairs go into their correctives; a shape's in-betweens get their share of its own.
+    pairs  gives Targets whose shapes are sound the correctives that are made from those
     """
     work = _Crossings(face, targets)
     with ThreadPoolExecutor(jobs) as pool:
         targets = work.with_shapes(targets, pool.map)
-        targets = work.with_pairs(targets, pool.map)
+        targets = work.with_pairs(pairs(targets) if pairs else targets, pool.map)
     return targets.evened(face.template.mirror) if is_even(face) else targets
 
 

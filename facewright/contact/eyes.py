@@ -7,7 +7,7 @@ the two, brings the margins together again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -50,33 +50,48 @@ class EyeShapeOptions:
 
 def solve_eyes(face, deltas, options=None):
     """Targets of a Face with its parts in place from its transferred shapes (s, n, 3) mm; eye shapes made anew."""
-    options = options or EyeShapeOptions()
-    names = list(face.template.shape_names)
-    result = np.array(deltas)
-    extras, in_betweens, correctives = {}, {}, {}
-    eyes = [_Eye(face, side, options) for side in ("left", "right")]
-    for eye in eyes:
-        for name, poses in eye.shapes(names, deltas).items():
-            result[names.index(name)] = poses.pop(1.0)
-            if poses:
-                in_betweens[name] = {weight: in_between_name(name, weight) for weight in poses}
-                extras |= {in_betweens[name][weight]: delta for weight, delta in poses.items()}
-    blinks = [result[names.index(eye.blink)] if eye.blink in names else None for eye in eyes]
-    back = max([eye.retraction(blink) for eye, blink in zip(eyes, blinks) if blink is not None], default=0.0)
-    for eye, blink in zip(eyes, blinks):
-        if blink is None:
-            continue
-        for other in eye.partners(names):
-            target = corrective_name((eye.blink, other))
-            extras[target] = eye.corrective(blink, result[names.index(other)], other)
-            correctives[target] = (eye.blink, other)
-        for pair in eye.diagonals(names):
-            target = corrective_name(pair)
-            extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
-            correctives[target] = pair
-        for part in eye_parts(face.template, eye.side):
-            blink[part.vertex_slice] -= [0.0, 0.0, back]
-    return Targets(tuple(names), result, extras, in_betweens, correctives)
+    eyes = EyeShapes(face, options)
+    return eyes.with_pairs(eyes.shapes(deltas))
+
+
+class EyeShapes:
+    """The eye shapes of a Face with its parts in place."""
+
+    def __init__(self, face, options=None):
+        self.face = face
+        self._names = list(face.template.shape_names)
+        self._eyes = [_Eye(face, side, options or EyeShapeOptions()) for side in ("left", "right")]
+
+    def shapes(self, deltas):
+        """Targets from transferred shapes (s, n, 3) mm: eye shapes made anew, and what gaze past a corner needs."""
+        names, result = self._names, np.array(deltas)
+        extras, in_betweens, correctives = {}, {}, {}
+        for eye in self._eyes:
+            for name, poses in eye.shapes(names, deltas).items():
+                result[names.index(name)] = poses.pop(1.0)
+                if poses:
+                    in_betweens[name] = {weight: in_between_name(name, weight) for weight in poses}
+                    extras |= {in_betweens[name][weight]: delta for weight, delta in poses.items()}
+            for pair in eye.diagonals(names):
+                target = corrective_name(pair)
+                extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
+                correctives[target] = pair
+        blinks = [(eye, result[names.index(eye.blink)]) for eye in self._eyes if eye.blink in names]
+        back = max([eye.retraction(blink) for eye, blink in blinks], default=0.0)
+        for eye, blink in blinks:
+            for part in eye_parts(self.face.template, eye.side):
+                blink[part.vertex_slice] -= [0.0, 0.0, back]
+        return Targets(tuple(names), result, extras, in_betweens, correctives)
+
+    def with_pairs(self, targets):
+        """Targets with what shut lids need beside other shapes of the eye: what has been mended since stays so."""
+        extras, correctives = dict(targets.extras), dict(targets.correctives)
+        for eye in self._eyes:
+            for other in eye.partners(self._names):
+                target = corrective_name((eye.blink, other))
+                extras[target] = eye.corrective(targets.delta(eye.blink), targets.delta(other), other)
+                correctives[target] = (eye.blink, other)
+        return replace(targets, extras=extras, correctives=correctives)
 
 
 class _Eye:
@@ -130,10 +145,10 @@ class _Eye:
         return needed_retraction(self.V, self.lid_faces, blink[self.skin], self.ball)
 
     def partners(self, names):
-        """Names of the shapes that need a corrective with this eye's blink."""
+        """Names of the shapes that need a corrective with this eye's blink, if there is one."""
         side = self.side.capitalize()
         wanted = [*look_shapes(self.side), f"eyeSquint{side}", f"eyeWide{side}", f"cheekSquint{side}"]
-        return [name for name in wanted if name in names]
+        return [name for name in wanted if {name, self.blink} <= set(names)]
 
     def corrective(self, blink, other, name):
         """(n, 3) what blink and another shape lack together: shut lids that go with the other shape as one."""
