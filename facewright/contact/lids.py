@@ -258,7 +258,12 @@ class Lids:
         turned = self.axes.turned(shut, share * turns) + share[:, None] * shift
         out = turned - ball.center
         turned = turned + out * (share * rise / np.linalg.norm(out, axis=1))[:, None]
-        return self._met(self.lifted(turned + (1.0 - share)[:, None] * motion, ball), unfolded=True)
+        result = self.lifted(turned + (1.0 - share)[:, None] * motion, ball)
+        crossing = self._met.crossings(result)
+        if crossing:
+            met = self._met(result, unfolded=True)
+            result = met if self._met.crossings(met) < crossing else result
+        return result
 
     def _waved(self, wanted, places, values):
         """Values (k,) at places along the axis, read at wanted as a few waves from 0 at the ends."""

@@ -15,6 +15,7 @@ from scipy.sparse.linalg import spsolve
 from facewright.contact.rims import from_ends
 from facewright.mesh.adjacency import unique_edges, within
 from facewright.mesh.folds import expected_normals
+from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import cross, dot, face_areas, face_corners, face_cross, normalized
 from facewright.mesh.overlap import barycentric, where_edges_pass
 from facewright.mesh.seam import seam_sides
@@ -74,6 +75,7 @@ class Meeting:
             self._ease[at], self._gap[at] = _MARGIN_EASE, _MARGIN_GAP_MM * share
         self._ease[np.intersect1d(*(at for at, *_ in self._margins))] = 0.0
         self._laplacian = _laplacian(self._rest, self._faces)
+        self._before = None
 
     def __call__(self, pose, unfolded=False):
         """The pose (n, 3) of shut lids with each lid on its side of the other one, turned as little as that takes.
@@ -101,6 +103,16 @@ class Meeting:
         turns = np.zeros(len(pose))
         turns[self._used] = motion / self._far
         return self.axes.turned(pose, turns)
+
+    def crossings(self, pose):
+        """Number of pairs of faces that cross in a pose (n, 3) and not at rest."""
+        if self._before is None:
+            self._before = self._crossing(self._rest)
+        return len(np.setdiff1d(self._crossing(pose[self._used]), self._before))
+
+    def _crossing(self, points):
+        pairs = self_intersections(points, self._faces)
+        return pairs[:, 0] * len(self._faces) + pairs[:, 1]
 
     def _size(self, along):
         """(m,) by how much a turn of their vertices changes what is seen of faces that look out at rest."""
