@@ -209,7 +209,8 @@ class _Eye:
         turn_u = wanted_u - self.lids.angles(pose[upper])
         turn_l = wanted_l - self.lids.angles(pose[lower])
         # Towards the canthi, which stay with the skin, the margins do too: else they would be torn off the corner.
-        return self.lids.turned(pose, *(turn * _ramp(self.V[c]) for turn, c in ((turn_u, upper), (turn_l, lower))))
+        turns = [turn * _ramp(self.V[c]) for turn, c in ((turn_u, upper), (turn_l, lower))]
+        return self.lids.turned(pose, *turns, slides=self.lids.spacing(pose))
 
     def _look(self, direction, own, weight):
         R = gaze_rotation(direction, self.side, weight)

@@ -128,12 +128,24 @@ class Lids:
         A corner of the eye is round: its points stand above each other, and closed they would fall together. From the
         canthus inwards each keeps a share of its distance from the last at rest.
         """
-        return [self._slides(pose[line], self.V[line]) for line in (self.upper, self.lower)]
+        return [
+            self._slides(pose[line], _KEPT_SPACING * np.linalg.norm(np.diff(self.V[line], axis=0), axis=1))
+            for line in (self.upper, self.lower)
+        ]
 
-    def _slides(self, chain, rest):
+    def spacing(self, pose):
+        """(u,), (l,) mm along the axis by which crowded margin points of a pose (n, 3) come apart: each keeps a share of
+        what it goes on from the last one at rest."""
+        result = []
+        for line in (self.upper, self.lower):
+            at = self.V[line] @ self.axis
+            steps = np.diff(at) * np.sign(at[-1] - at[0])
+            result.append(self._slides(pose[line], np.minimum(steps, _KEPT_SPACING * steps)))
+        return result
+
+    def _slides(self, chain, steps):
         at = chain @ self.axis
         way = np.sign(at[-1] - at[0])
-        steps = _KEPT_SPACING * np.linalg.norm(np.diff(rest, axis=0), axis=1)
         from_, slid = at * way, at * way  # from the first canthus to the last
         middle = len(at) // 2
         for i in range(1, middle):

@@ -7,6 +7,7 @@ import numpy as np
 from facewright.mesh.normals import normalized
 
 _ENDS_MM = 2.0  # from a canthus: there it sets in
+_CORNER_MM = 3.0  # the same of a rim: round a corner the margin turns too far for it
 _LEAN = np.radians(30.0)  # over its margin, of the rim of a shut lid
 _FIRM_MM, _SOFT_MM = 1.2, 2.8  # from the margin: so far a lid keeps its form whole, and not at all
 
@@ -72,13 +73,20 @@ def _hung(vertices, side, line):
     away = np.linalg.norm(vertices[side][:, None] - start - share[:, :, None] * edge, axis=2)
     nearest = away.argmin(axis=1)
     k = np.arange(len(side))
-    weight = np.clip((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM), 0.0, 1.0)
+    share, ends = share[k, nearest], from_ends(vertices[line], _CORNER_MM)
+    weight = smooth_step((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM))
+    weight *= smooth_step((1.0 - share) * ends[nearest] + share * ends[nearest + 1])
     hangs = weight > 0.0
-    weight = (weight * weight * (3.0 - 2.0 * weight))[hangs]
-    return side[hangs], nearest[hangs], share[k, nearest][hangs], weight
+    return side[hangs], nearest[hangs], share[hangs], weight[hangs]
 
 
-def from_ends(chain):
-    """(k,) 0 at the ends of a chain of points (k, 3), 1 from _ENDS_MM on."""
+def smooth_step(share):
+    """Shares cut to 0..1, without an edge where they reach either."""
+    share = np.clip(share, 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+def from_ends(chain, reach_mm=_ENDS_MM):
+    """(k,) 0 at the ends of a chain of points (k, 3), 1 from reach_mm on."""
     steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
-    return np.clip(np.minimum(steps, steps[-1] - steps) / _ENDS_MM, 0.0, 1.0)
+    return np.clip(np.minimum(steps, steps[-1] - steps) / reach_mm, 0.0, 1.0)
