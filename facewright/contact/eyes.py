@@ -126,7 +126,7 @@ class _Eye:
         side = self.side.capitalize()
         made = {self.blink: (self._blink, _BLINK_STEPS), f"eyeWide{side}": (self._wide, (HALF, 1.0))}
         found = {
-            name: {weight: self._full(make(weight), shut=name == self.blink and weight == 1.0) for weight in weights}
+            name: {weight: self._full(make(weight)) for weight in weights}
             for name, (make, weights) in made.items()
             if name in names
         }
@@ -161,7 +161,7 @@ class _Eye:
             turn = np.radians(self.options.look_turn_deg[direction][1]) * self.profiles[1] ** (1.0 / _FULLNESS)
         else:
             turn = self.lids.angles((shut + motion)[lower]) - self.lids.angles(shut[lower])
-        return self._full(self.lids.carried(shut, motion, turn, ball), shut + motion, ball, shut=True)
+        return self._full(self.lids.carried(shut, motion, turn, ball), shut + motion)
 
     def _closing_turns(self):
         """(u,), (l,) radians that bring both margins of the neutral to the closing line, where they will have slid."""
@@ -183,7 +183,7 @@ class _Eye:
         turns = [gaze_rotation(looks[name], self.side) for name in pair]
         R = Rotation.from_rotvec(sum(Rotation.from_matrix(turn).as_rotvec() for turn in turns)).as_matrix()
         ball = self.ball.turned(R)
-        full = self._full(self.lids.lifted(pose, ball), pose, ball)
+        full = self._full(self.lids.settled(self.lids.lifted(pose, ball), ball), pose)
         # Two turns added up as chords swell the ball: it gets the one turn that they mean.
         missing = R - turns[0] - turns[1] + np.eye(3)
         for part in eye_parts(self.face.template, self.side):
@@ -195,7 +195,7 @@ class _Eye:
         passing = self.options.passing_mm * (2.0 if weight == 1.0 else 1.0)
         turns = [weight * turn for turn in self._closing_turns()]
         pose = self.lids.turned(self.V, *turns, slides=slides, passing_mm=passing)
-        return self.lids.joined(pose) if weight == 1.0 else pose
+        return self.lids.joined(pose) if weight == 1.0 else self.lids.settled(pose)
 
     def _wide(self, weight):
         return self._by_degrees(self.V, self.options.wide_turn_deg, weight, self.ball)
@@ -210,14 +210,14 @@ class _Eye:
         turn_l = wanted_l - self.lids.angles(pose[lower])
         # Towards the canthi, which stay with the skin, the margins do too: else they would be torn off the corner.
         turns = [turn * _ramp(self.V[c]) for turn, c in ((turn_u, upper), (turn_l, lower))]
-        return self.lids.turned(pose, *turns, slides=self.lids.spacing(pose))
+        return self.lids.settled(self.lids.turned(pose, *turns, slides=self.lids.spacing(pose)))
 
     def _look(self, direction, own, weight):
         R = gaze_rotation(direction, self.side, weight)
         turns = self.options.look_turn_deg[direction]
         pose = self.V if any(turns) else self.V + weight * own
         ball = self.ball.turned(R)
-        full = self._full(self._by_degrees(pose, turns, weight, ball), ball=ball)
+        full = self._full(self._by_degrees(pose, turns, weight, ball))
         for part in eye_parts(self.face.template, self.side):
             offset = self.face.vertices[part.vertex_slice] - self.ball.center
             full[part.vertex_slice] = offset @ R.T - offset
@@ -225,13 +225,12 @@ class _Eye:
 
     def _by_degrees(self, pose, degrees, weight, ball):
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
-        return self.lids.turned(pose, upper, lower, ball)
+        return self.lids.settled(self.lids.turned(pose, upper, lower, ball), ball)
 
-    def _full(self, pose, base=None, ball=None, shut=False):
-        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose, over the ball as it lies;
-        shut: the lids are."""
+    def _full(self, pose, base=None):
+        """(n, 3) delta of all parts that leads the skin from base (the neutral) to a pose."""
         delta = np.zeros(self.face.vertices.shape)
-        delta[self.skin] = self.lids.settled(pose, ball, shut) - (self.V if base is None else base)
+        delta[self.skin] = pose - (self.V if base is None else base)
         delta[max_norms(delta) < 1e-4] = 0.0
         return delta
 

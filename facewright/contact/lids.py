@@ -224,7 +224,7 @@ class Lids:
         return result
 
     def joined(self, pose, ball=None):
-        """The pose (n, 3) of closed lids with both margins on one line over the ball, smooth up to the canthi.
+        """The settled pose (n, 3) of closed lids with both margins on one line over the ball, smooth up to the canthi.
 
         Where the margins lie along the axis and how high they are turned is left; their distance from the centre is the
         ball's and options.closed_mm, and runs to that of the canthi over the last millimetres.
@@ -241,7 +241,22 @@ class Lids:
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
-        return self._met(self._firm(self.lifted(pose + np.stack(spread, axis=1), ball)))
+        pose = self.lifted(pose + np.stack(spread, axis=1), ball)
+        # Round a corner some rims pass through others when their margins carry them, some when these do not.
+        return self._soundest(
+            self.settled(self._met(self._firm(pose, corners)), ball, shut=True) for corners in (True, False)
+        )
+
+    def _soundest(self, poses):
+        """The first of some poses (n, 3) without faults, or that with the fewest: crossings and folded faces."""
+        best, fewest = None, np.inf
+        for pose in poses:
+            faults = self._met.faults(pose)
+            if faults < fewest:
+                best, fewest = pose, faults
+            if not faults:
+                break
+        return best
 
     def carried(self, shut, motion, turn, ball=None):
         """The pose (n, 3) of shut lids that another shape moves by motion (n, 3) besides.
@@ -271,11 +286,8 @@ class Lids:
         out = turned - ball.center
         turned = turned + out * (share * rise / np.linalg.norm(out, axis=1))[:, None]
         result = self.lifted(turned + (1.0 - share)[:, None] * motion, ball)
-        crossing = self._met.crossings(result)
-        if crossing:
-            met = self._met(result, unfolded=True)
-            result = met if self._met.crossings(met) < crossing else result
-        return result
+        ways = (lambda: result, lambda: self._met(result, unfolded=True))
+        return self._soundest(self.settled(way(), ball, shut=True) for way in ways)
 
     def _waved(self, wanted, places, values):
         """Values (k,) at places along the axis, read at wanted as a few waves from 0 at the ends."""

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 
 from facewright.contact.rims import from_ends
 from facewright.mesh.adjacency import unique_edges, within
-from facewright.mesh.folds import expected_normals
+from facewright.mesh.folds import expected_normals, folded_by_shape
 from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import cross, dot, face_areas, face_corners, face_cross, normalized
 from facewright.mesh.overlap import barycentric, where_edges_pass
@@ -22,11 +22,12 @@ from facewright.mesh.seam import seam_sides
 
 _REACH_MM, _LINING_MM = 8.0, 3.0  # over the skin and over the lining from the margins: what the other lid may meet
 _GAP_MM, _MARGIN_GAP_MM = 0.03, 0.01  # left between two lids, and beside their margins
-_OVER_MM = 0.02  # by which the upper margin comes before the lower one, so that nobody looks between them
+_OVER_MM = 0.04  # by which the upper margin comes before the lower one, so that nobody looks between them
 _NEAR_MM, _DEEPEST_MM = 0.5, 4.0  # lids nearer than this over a place may come to meet there; deeper is no contact
 _MARGIN_EASE = 0.004  # how readily a margin gives way; the rest: 1
 _LEAST_EASE = 1e-3  # taken of a wish that hardly anything can meet, or it would pull without end
 _STEPS = 120
+_FOLD = 10.0  # crossings that a folded face counts as
 _PRESSED, _LEAST_SHARE = 0.5, 0.15  # of its area at rest, seen as it should look: a face is watched, and keeps so much
 _SUSPECT = 0.5  # the same beside its neighbours, from which on it is looked at closely
 _FRONT, _NARROW_MM = 0.5, 0.05  # seen from ahead: share of its area from which on a face looks out; its least width
@@ -104,11 +105,13 @@ class Meeting:
         turns[self._used] = motion / self._far
         return self.axes.turned(pose, turns)
 
-    def crossings(self, pose):
-        """Number of pairs of faces that cross in a pose (n, 3) and not at rest."""
+    def faults(self, pose):
+        """Number of pairs of faces that cross in a pose (n, 3) and not at rest, and of folded faces."""
         if self._before is None:
             self._before = self._crossing(self._rest)
-        return len(np.setdiff1d(self._crossing(pose[self._used]), self._before))
+        points = pose[self._used]
+        crossing = np.setdiff1d(self._crossing(points), self._before)
+        return len(crossing) + _FOLD * len(folded_by_shape(self._rest, points, self._faces))
 
     def _crossing(self, points):
         pairs = self_intersections(points, self._faces)

@@ -7,7 +7,7 @@ import numpy as np
 from facewright.mesh.normals import normalized
 
 _ENDS_MM = 2.0  # from a canthus: there it sets in
-_CORNER_MM = 3.0  # the same of a rim: round a corner the margin turns too far for it
+_CORNER_MM = 3.0  # the same of rims that leave the corners alone
 _LEAN = np.radians(30.0)  # over its margin, of the rim of a shut lid
 _FIRM_MM, _SOFT_MM = 1.2, 2.8  # from the margin: so far a lid keeps its form whole, and not at all
 
@@ -24,7 +24,7 @@ class FirmRims:
     def __init__(self, vertices, sides, margins, center):
         self._margins, self._center = margins, center
         hung = [_hung(vertices, np.flatnonzero(side), line) for side, line in zip(sides, margins)]
-        self._index, self._on, self._share, self._weight = zip(*hung)
+        self._index, self._on, self._share, self._weight, self._inner = zip(*hung)
         frames = self._frames(vertices)
         # The way from the lower margin to the upper one, across both, says on which side the other lid lies.
         up = vertices[margins[0][len(margins[0]) // 2]] - vertices[margins[1][len(margins[1]) // 2]]
@@ -33,13 +33,17 @@ class FirmRims:
             offset = np.einsum("kij,kj->ki", frame, vertices[index] - foot)
             self._offsets.append(_leaning(offset, sign * np.sign(frame[:, 2].sum(axis=0) @ up)))
 
-    def __call__(self, pose):
-        """The pose (n, 3) of shut lids with rims as the margins carry them; none leans over its margin much."""
+    def __call__(self, pose, corners=True):
+        """The pose (n, 3) of shut lids with rims as the margins carry them; none leans over its margin much.
+
+        corners  rims are carried round the corners of the eye too
+        """
         result = pose.copy()
         for number, (foot, frame) in enumerate(self._frames(pose)):
             index = self._index[number]
             carried = foot + np.einsum("kij,ki->kj", frame, self._offsets[number])
-            result[index] += self._weight[number][:, None] * (carried - pose[index])
+            weight = self._weight[number] * (1.0 if corners else self._inner[number])
+            result[index] += weight[:, None] * (carried - pose[index])
         return result
 
     def _frames(self, pose):
@@ -66,7 +70,7 @@ def _leaning(offsets, over):
 
 def _hung(vertices, side, line):
     """Vertices of one lid near its margin: their indices, the margin's edges that they hang on, the share of the way
-    along those, and how firmly they hang there."""
+    along those, how firmly they hang there, and how far from the corners (0 to 1)."""
     start, edge = vertices[line[:-1]], np.diff(vertices[line], axis=0)
     share = ((vertices[side][:, None] - start) * edge).sum(axis=2) / np.maximum((edge**2).sum(axis=1), 1e-12)
     share = np.clip(share, 0.0, 1.0)
@@ -75,9 +79,9 @@ def _hung(vertices, side, line):
     k = np.arange(len(side))
     share, ends = share[k, nearest], from_ends(vertices[line], _CORNER_MM)
     weight = smooth_step((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM))
-    weight *= smooth_step((1.0 - share) * ends[nearest] + share * ends[nearest + 1])
+    inner = smooth_step((1.0 - share) * ends[nearest] + share * ends[nearest + 1])
     hangs = weight > 0.0
-    return side[hangs], nearest[hangs], share[hangs], weight[hangs]
+    return side[hangs], nearest[hangs], share[hangs], weight[hangs], inner[hangs]
 
 
 def smooth_step(share):
