@@ -155,12 +155,11 @@ class _Eye:
         shut, motion = self.V + blink[self.skin], other[self.skin]
         direction = look_shapes(self.side).get(name)
         ball = self.ball.turned(gaze_rotation(direction, self.side)) if direction else self.ball
-        lower = self.lids.lower
         if direction:
             # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
             turn = np.radians(self.options.look_turn_deg[direction][1]) * self.profiles[1] ** (1.0 / _FULLNESS)
         else:
-            turn = self.lids.angles((shut + motion)[lower]) - self.lids.angles(shut[lower])
+            turn = self.lids.turn_of(shut, motion)
         return self._full(self.lids.carried(shut, motion, turn, ball), shut + motion)
 
     def _closing_turns(self):

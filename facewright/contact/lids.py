@@ -16,9 +16,10 @@ from scipy.spatial import cKDTree
 
 from facewright.contact.axes import EyeAxes
 from facewright.contact.meeting import Meeting, along_line
-from facewright.contact.rims import FirmRims, from_ends
+from facewright.contact.rims import FirmRims, from_ends, smooth_step
 from facewright.mesh.adjacency import unique_edges
 from facewright.mesh.folds import laid_flat
+from facewright.mesh.normals import normalized
 from facewright.mesh.spread import SmoothSpread
 from facewright.solve.quadratic import Factorization
 from facewright.transfer.eyeball import lid_clearance
@@ -134,8 +135,8 @@ class Lids:
         ]
 
     def spacing(self, pose):
-        """(u,), (l,) mm along the axis by which crowded margin points of a pose (n, 3) come apart: each keeps a share of
-        what it goes on from the last one at rest."""
+        """(u,), (l,) mm along the axis by which crowded margin points of a pose (n, 3) come apart: each keeps a share
+        of what it goes on from the last one at rest."""
         result = []
         for line in (self.upper, self.lower):
             at = self.V[line] @ self.axis
@@ -262,39 +263,45 @@ class Lids:
         """The pose (n, 3) of shut lids that another shape moves by motion (n, 3) besides.
 
         turn  (l,) radians by which the shape turns the lower margin
-        What lies near the closing line is turned, shifted and raised as one, by what depends on the place along the axis
-        alone: such a map of space lets nothing pass through anything. Farther away the shape's own motion takes over.
+        What lies near the closing line is turned, shifted and raised as one, by what depends on the place along the
+        axis alone: such a map of space lets nothing pass through anything. Farther away the shape's own motion takes
+        over. What faces, which are flat, miss of that is mended as in joined.
         """
         ball = ball or self.ball
         away = cKDTree(shut[self.margin]).query(shut, distance_upper_bound=_ALONE_MM)[0]
-        share = np.clip((_ALONE_MM - away) / (_ALONE_MM - _AS_ONE_MM), 0.0, 1.0)
-        share = share * share * (3.0 - 2.0 * share)
-        along = (shut - ball.center) @ self.axis
+        share = smooth_step((_ALONE_MM - away) / (_ALONE_MM - _AS_ONE_MM))[:, None]
+        along = shut @ self.axis
         ends = self.lower[[0, -1]]
-        shift = np.stack([along_line(along, along[ends], motion[ends, c]) for c in range(3)], axis=1)
         turns = self._waved(along, along[self.lower], turn)
+        shift = np.stack([along_line(along, along[ends], motion[ends, c]) for c in range(3)], axis=1)
         line = self.axes.turned(shut, turns) + shift
-        rise = np.zeros(len(shut))
-        lower, upper = self.lower, self.upper
-        rises = []
-        for index in (lower, upper):
-            radius = self._closed_radius(line[index], line[self.canthi], ball)
-            before = self._closed_radius(shut[index], shut[self.canthi], self.ball)
-            rises.append(self._waved(along, along[index], radius - before))
-        rise = 0.5 * (rises[0] + rises[1])
-        turned = self.axes.turned(shut, share * turns) + share[:, None] * shift
-        out = turned - ball.center
-        turned = turned + out * (share * rise / np.linalg.norm(out, axis=1))[:, None]
-        result = self.lifted(turned + (1.0 - share)[:, None] * motion, ball)
+        rises = [
+            self._waved(along, along[index], self._closed_radius(line[index], line[self.canthi], ball) - before)
+            for index in (self.upper, self.lower)
+            for before in [self._closed_radius(shut[index], shut[self.canthi], self.ball)]
+        ]
+        result = self.axes.turned(shut, share[:, 0] * turns) + share * shift
+        outward = result - ball.center
+        result += share * np.mean(rises, axis=0)[:, None] * normalized(outward)
+        result = self.lifted(result + (1.0 - share) * motion, ball)
         ways = (lambda: result, lambda: self._met(result, unfolded=True))
         return self._soundest(self.settled(way(), ball, shut=True) for way in ways)
 
+    def turn_of(self, shut, motion):
+        """(l,) radians at the lower margin by which a motion (n, 3) turns shut lids (n, 3): half way between both."""
+        upper, lower = (
+            self.angles((shut + motion)[line]) - self.angles(shut[line]) for line in (self.upper, self.lower)
+        )
+        at = shut @ self.axis
+        return 0.5 * (lower + along_line(at[self.lower], at[self.upper], upper))
+
     def _waved(self, wanted, places, values):
-        """Values (k,) at places along the axis, read at wanted as a few waves from 0 at the ends."""
+        """(k,) values (m,) at places along the axis, read at wanted as a few waves over the chord, 0 at its ends."""
         start, stop = places.min(), places.max()
-        waves = np.arange(1, _WAVES + 1)
-        height = np.linalg.lstsq(np.sin(np.pi * np.outer((places - start) / (stop - start), waves)), values, rcond=None)[0]
-        return np.sin(np.pi * np.outer(np.clip((wanted - start) / (stop - start), 0.0, 1.0), waves)) @ height
+        waves = np.pi * np.arange(1, _WAVES + 1)
+        share, read = ((np.clip(at, start, stop) - start) / (stop - start) for at in (places, wanted))
+        heights = np.linalg.lstsq(np.sin(np.outer(share, waves)), values, rcond=None)[0]
+        return np.sin(np.outer(read, waves)) @ heights
 
     def _closed_radius(self, points, canthi, ball):
         """(k,) distance from the centre that closed margins have at points (k, 3)."""

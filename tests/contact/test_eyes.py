@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facewright.contact import solve_eyes
+from facewright.contact import EyeShapes, Targets, solve_eyes
 from facewright.contact.gaze import gaze_rotation
 from facewright.evaluate.eyes import margin_gap_mm
 from facewright.expand import expand_weights
@@ -80,3 +80,29 @@ def test_only_the_lids_move_and_the_ball_draws_back_as_one(hm08, solved):
     margin = face.vertices[np.concatenate([face.lines["lid_upper_left"], face.lines["lid_lower_left"]])]
     distance = np.linalg.norm(face.vertices[moved][:, None] - margin[None], axis=2).min(axis=1)
     assert distance.max() < 30
+
+
+def test_pairs_carry_shut_lids_as_one(solved):
+    """Whatever else the eye does: near the closing line both lids go together, and do not come apart."""
+    for face, eyes in solved:
+        skin = face.template.skin.vertex_slice
+        lines = [face.lines[f"lid_{lid}_left"] for lid in ("upper", "lower")]
+        blink = posed(face, eyes, {"eyeBlinkLeft": 1.0})[skin]
+        apart = margin_gap_mm(*(blink[line] for line in lines))
+        for other in ("eyeSquintLeft", "cheekSquintLeft", "eyeWideLeft", "eyeLookDownLeft", "eyeLookUpLeft"):
+            pose = posed(face, eyes, {"eyeBlinkLeft": 1.0, other: 1.0})[skin]
+            assert margin_gap_mm(*(pose[line] for line in lines)) < apart + 0.1
+
+
+def test_pairs_are_made_of_the_shapes_as_they_are(solved):
+    """A blink that was mended since leaves its mark in the pair, though nothing else has changed."""
+    face, eyes = solved[1]
+    names = list(face.template.shape_names)
+    mended = np.array(eyes.deltas)
+    mended[names.index("eyeBlinkLeft"), face.lines["lid_upper_left"]] += [0.0, 0.0, 0.02]
+    before, after = (
+        EyeShapes(face).with_pairs(Targets(eyes.names, deltas, {}, {}, {})) for deltas in (eyes.deltas, mended)
+    )
+    pair = {"eyeBlinkLeft": 1.0, "eyeSquintLeft": 1.0}
+    change = (after.motion(pair) - before.motion(pair))[face.lines["lid_upper_left"]]
+    assert np.abs(np.median(change, axis=0) - [0.0, 0.0, 0.02]).max() < 0.01

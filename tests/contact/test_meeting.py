@@ -76,3 +76,9 @@ def test_lids_that_meet_already_stay(shut):
     *_, meeting, pose, _ = shut
     met = meeting(pose)
     assert np.linalg.norm(meeting(met) - met, axis=1).max() < 0.02
+
+
+def test_faults_are_new_crossings_and_folds(shut):
+    V, faces, _, meeting, pose, _ = shut
+    assert meeting.faults(V) == meeting.faults(meeting(pose)) == 0
+    assert meeting.faults(pose) >= len(self_intersections(pose, faces)) > 50

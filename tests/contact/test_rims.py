@@ -45,3 +45,14 @@ def test_rims_that_lean_over_far_are_laid_down():
         out = middle @ away
         assert np.allclose(np.degrees(np.arccos(out / np.linalg.norm(middle, axis=1))), 30.0, atol=0.5)
         assert (toward * (middle - out[:, None] * away)[:, 1] > 0.0).all()
+
+
+def test_rims_may_leave_the_corners_alone():
+    V, sides, margins, index = shelves(20.0)
+    pushed = V.copy()
+    for side in sides:
+        pushed[side] += [0.0, 0.2, 0.1]
+    whole, inner = (FirmRims(V, sides, margins, np.zeros(3))(pushed, corners) for corners in (True, False))
+    ends, middle = index[:, 1:, [0, -1]].ravel(), index[:, 1:, 5:12].ravel()
+    assert np.allclose(whole, V, atol=1e-9)
+    assert np.allclose(inner[ends], pushed[ends], atol=0.02) and np.allclose(inner[middle], V[middle], atol=1e-9)
