@@ -102,7 +102,9 @@ class _Crossings:
             return [change + act * both for change, act in zip(alone, acts)]
 
         asked = _with_twins(targets.names)
-        changes = {name: change for names, found in zip(asked, run(fields, asked)) for name, change in zip(names, found)}
+        changes = {
+            name: change for names, found in zip(asked, run(fields, asked)) for name, change in zip(names, found)
+        }
         for number, name in enumerate(targets.names):
             # What was asked about with another shape beneath stays with it what it became.
             change = changes[name] - changes.get(CORRECTIVE_BASE.get(name), 0.0)
@@ -130,7 +132,7 @@ class _Crossings:
 
 
 def _with_twins(names):
-    """Names in tuples: those of a left and a right shape of the mouth together, since their sides meet at its middle."""
+    """Names in tuples: a left and a right shape of the mouth together, since their sides meet at its middle."""
     lefts = [name for name in names if name.startswith("mouth") and name.endswith("Left") and name != "mouthLeft"]
     pairs = [(name, mirrored_name(name)) for name in lefts if mirrored_name(name) in names]
     paired = {name for pair in pairs for name in pair}

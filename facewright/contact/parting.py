@@ -3,9 +3,10 @@
 Contact asks vertices, and stops at a depth that nobody sees; edges of the small faces at a corner of the mouth and in
 shut lids still pass through each other. Here the pairs of faces that cross are found exactly and moved apart along the
 normals between them, as far as they reach past each other (position-based constraints: Mueller et al. 2007), until none
-crosses. Which of two sheets belongs in front is known of an upper lip and a lower one. Else it is told by the winding
-number: between skins that meet it is that of flesh on either side of the crossing; between a skin and its own lining,
-turned inside out, that of air. Asked of lips too, a thin one that has crumpled is sent through the other.
+crosses. What goes on crossing is crumpled: its motion is made smooth in space as far as that helps, and it is moved
+apart again. Which of two sheets belongs in front is known of an upper lip and a lower one. Else it is told by the
+winding number: between skins that meet it is that of flesh on either side of the crossing; between a skin and its own
+lining, turned inside out, that of air. Asked of lips too, a thin one that has crumpled is sent through the other.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ class PartingOptions:
     shorter   share of the other way out at which one is taken whatever lies there
     least_act where the correction acts less it is taken to act so much, or it would grow large for the rest
     patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
+    eased_mm  widths within which motion is made smooth around crossings that stay, one after the other; eased_shares of
+              the way there that are tried; eased_rings of faces around such a crossing that hang together with it
     """
 
     gap_mm: float = 0.005
@@ -133,8 +136,7 @@ class Parting:
         return int((lengths(pose.way_out(pose.skin(field)[moved])) > _DEEP_MM).sum()) if len(moved) else 0
 
     def _eased(self, poses, field, farthest, width):
-        """A field that makes what crosses, and what is around it, go as space would that is moved smoothly: the way to
-        there on which the fewest faults are left. What lies before something at rest then stays before it."""
+        """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults."""
         self._faults(poses, field)
         way = np.zeros_like(field)
         for pose in poses:
@@ -144,8 +146,8 @@ class Parting:
         return min(ways, key=lambda field: self._faults(poses, field))
 
     def _smoothly(self, pose, field, width):
-        """(k, 3) from where the skin around crossings of a pose is to where its mean motion within a width takes it,
-        fading out; rest says what is how near, and only what hangs together with the crossing counts."""
+        """(k, 3) what makes the motion of a pose smooth around its crossings; only what hangs together with one counts,
+        or an open mouth would be drawn shut."""
         crossing = np.zeros(len(field), bool)
         crossing[self.faces[pose.pairs]] = True
         among = dilate(crossing, self.faces, self.options.eased_rings)

@@ -14,7 +14,7 @@ def eased(rest, mass, motion, place, width, among=None):
     """(n, 3) by which the motion (n, 3) of points (n, 3) at rest differs from its own mean within a width, in mm.
 
     Whole at the place, a mask (n,) of points, and fading out within two widths of it. Points count by mass (n,), those
-    of a mask (n,) among alone; the mean is Gaussian, so that space is moved smoothly and nothing passes through anything
+    of a mask (n,) among alone; the mean is Gaussian: space is moved smoothly, and nothing passes through anything.
     """
     result = np.zeros_like(motion)
     if not place.any():
@@ -25,7 +25,9 @@ def eased(rest, mass, motion, place, width, among=None):
         near &= among
     near = np.flatnonzero(near)
     around = np.flatnonzero(among) if among is not None else np.arange(len(rest))
-    away_from = cKDTree(rest[near]).sparse_distance_matrix(cKDTree(rest[around]), _KERNEL * width, output_type="coo_matrix")
+    away_from = cKDTree(rest[near]).sparse_distance_matrix(
+        cKDTree(rest[around]), _KERNEL * width, output_type="coo_matrix"
+    )
     shares = np.exp(-0.5 * (away_from.data / width) ** 2) * mass[around][away_from.col]
     kernel = sp.csr_matrix((shares, (away_from.row, away_from.col)), away_from.shape)
     mean = (kernel @ motion[around]) / np.maximum(np.asarray(kernel.sum(axis=1)), 1e-12)
