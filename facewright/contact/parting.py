@@ -44,7 +44,8 @@ class PartingOptions:
     least_act where the correction acts less it is taken to act so much, or it would grow large for the rest
     patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
     eased_mm  widths within which motion is made smooth around crossings that stay, one after the other; eased_shares of
-              the way there that are tried; eased_rings of faces around such a crossing that hang together with it
+              the way there that are tried; eased_rings of faces around such a crossing that hang together with it;
+              eased_patience as before
     """
 
     gap_mm: float = 0.005
@@ -60,6 +61,7 @@ class PartingOptions:
     eased_mm: tuple[float, ...] = (1.0, 2.0, 0.5)
     eased_shares: tuple[float, ...] = (0.25, 0.5, 0.75, 1.0)
     eased_rings: int = 6
+    eased_patience: int = 3
 
 
 class Parting:
@@ -100,19 +102,20 @@ class Parting:
         poses = [_Pose(pose[self.used], self._cut(act), way_out) for pose, act, way_out in asked]
         for pose in poses[len(poses) - clean :]:
             pose.looked = pose.skin(field)
-        field, faults = self._parted(poses, field, farthest)
+        field, faults = self._parted(poses, field, farthest, self.options.patience)
         for width in self.options.eased_mm:
-            if not faults:
+            other = self._eased(poses, field, farthest, width) if faults else None
+            if other is None:
                 break
-            other, of_other = self._parted(poses, self._eased(poses, field, farthest, width), farthest)
+            other, of_other = self._parted(poses, other, farthest, self.options.eased_patience)
             if of_other < faults:
                 field, faults = other, of_other
         return self._of_skin(field)
 
-    def _parted(self, poses, field, farthest):
+    def _parted(self, poses, field, farthest, patience):
         """A field (k, 3), from the given one on, that leaves the fewest faults, and how many."""
         best, fewest, waited = field, np.inf, 0
-        while waited < self.options.patience:
+        while waited < patience:
             faults = self._faults(poses, field)
             if not faults:
                 return field, 0
@@ -136,8 +139,10 @@ class Parting:
         return int((lengths(pose.way_out(pose.skin(field)[moved])) > _DEEP_MM).sum()) if len(moved) else 0
 
     def _eased(self, poses, field, farthest, width):
-        """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults."""
-        self._faults(poses, field)
+        """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults; None where
+        nothing crosses."""
+        if not sum(self._look(pose, field) for pose in poses):
+            return None
         way = np.zeros_like(field)
         for pose in poses:
             if len(pose.pairs):
