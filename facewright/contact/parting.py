@@ -139,8 +139,10 @@ class Parting:
         return int((lengths(pose.way_out(pose.skin(field)[moved])) > _DEEP_MM).sum()) if len(moved) else 0
 
     def _eased(self, poses, field, farthest, width):
-        """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults; None where
-        nothing crosses."""
+        """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults.
+
+        None where nothing crosses.
+        """
         if not sum(self._look(pose, field) for pose in poses):
             return None
         way = np.zeros_like(field)
