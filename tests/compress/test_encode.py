@@ -112,10 +112,10 @@ def test_images_no_wider_than_a_weight_texel(shape):
     assert packed.report["mean_rmse"] <= constant.report["mean_rmse"] + 0.3
 
 
-def unrelated(n, size=96, seed=0):
+def unrelated(n, size=96, seed=0, blur=2):
     """A neutral and n textures of blurred noise each its own."""
     rng = np.random.default_rng(seed)
-    fields = [gaussian_filter(rng.normal(0, 1, (size, size, 3)), (2, 2, 0)) for _ in range(n + 1)]
+    fields = [gaussian_filter(rng.normal(0, 1, (size, size, 3)), (blur, blur, 0)) for _ in range(n + 1)]
     return [np.clip(128 + 200 * field, 0, 255).astype(np.uint8) for field in fields]
 
 
