@@ -138,6 +138,15 @@ def test_finer_weights_never_take_more_memory(n, shapes):
     assert (packed.cell, len(packed.textures)) == (8, 4)
 
 
+def test_finer_weights_are_open_to_a_budget_that_they_fit():
+    neutral, *images = unrelated(20)
+    finer, published = (facezip(neutral, images, options=FacezipOptions(textures=k)) for k in (None, 4))
+    budget = (finer.memory_bytes() + published.memory_bytes()) // 2  # too small for four difference textures
+    packed, fewer = (facezip(neutral, images, options=FacezipOptions(budget=b)) for b in (budget, budget // 2))
+    assert (packed.cell, packed.memory_bytes()) == (4, finer.memory_bytes()) and packed.memory_bytes() <= budget
+    assert fewer.cell == 8 and fewer.memory_bytes() <= budget // 2
+
+
 def test_textures_that_share_their_structure_keep_four_difference_textures():
     made = expression_set(96, 16, strength=20, noise=0)
     packed = facezip(made.neutral, made.textures, covered=made.covered)
