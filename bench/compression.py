@@ -324,10 +324,12 @@ def main():
     folders = options.set if options.set is not None else sorted(TEXTURES.glob("*/")) if TEXTURES.is_dir() else []
     verdict = Verdict()
     sets = [(folder.name, read_set(folder), np.inf) for folder in folders] + list(generated_sets())
-    run = {"seams": seams, "priority": priority, "examples": examples}
+    more = [each for name, textures, _ in sets if name == FACES for each in face_sets(name, textures)]
+    run = {"priority": priority, "examples": examples}
     if "quality" in parts:
-        more = [each for name, textures, _ in sets if name == FACES for each in face_sets(name, textures)]
         quality(sets + more, verdict)
+    if "seams" in parts:
+        seams(sets + more, verdict)
     if "search" in parts:
         search(sets + list(small_sets()), verdict)
     for part in parts:

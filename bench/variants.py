@@ -11,12 +11,14 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 from PIL import Image
+from scipy.ndimage import distance_transform_edt
 from scipy.sparse.csgraph import connected_components
 
 from facewright.data import Scan
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.raster import raster_uv
 from facewright.mesh.render import sample_texture
+from facewright.mesh.subdivide import split_in_four, with_midpoints
 from facewright.sample.charts import layout
 
 DECIMATED, SUBDIVIDED = 3_000, 500_000
@@ -80,6 +82,8 @@ def decimated(scan, count=DECIMATED):
     image = np.zeros((1024, 1024, 3), np.uint8)
     at = interpolate(scan.uv, scan.uv_faces, nearest.faces, nearest.barycentric)
     image[covered] = sample_texture(scan.textures[0], at)[:, :3]
+    # As every baker does: colours go on past the borders of charts, or seams are drawn as black lines on the face.
+    image = image[tuple(distance_transform_edt(~covered, return_distances=False, return_indices=True))]
     return Scan(V, F, uv=uv, uv_faces=uv_faces, textures=(image,), face_texture=np.zeros(len(F)), unit_mm=scan.unit_mm)
 
 
@@ -105,23 +109,13 @@ def subdivided(scan, count=SUBDIVIDED):
     """Every triangle in four until the next step would be too many, then some in three up to the count."""
     V, F, uv, uv_faces = scan.vertices, scan.faces, scan.uv, scan.uv_faces
     while 4 * len(F) <= count:
-        V, F = _upsample(V, F)
-        uv, uv_faces = _upsample(uv, uv_faces)
+        edges, F = split_in_four(F, len(V))
+        uv_edges, uv_faces = split_in_four(uv_faces, len(uv))
+        V, uv = with_midpoints(V, edges), with_midpoints(uv, uv_edges)
     some = np.arange(min((count - len(F)) // 2, len(F)))
     V, F = _split(V, F, some)
     uv, uv_faces = _split(uv, uv_faces, some)
     return replace(scan, vertices=V, faces=F, uv=uv, uv_faces=uv_faces, face_texture=np.zeros(len(F)), colors=None)
-
-
-def _upsample(V, F):
-    """Every triangle in four; the order of faces and corners does not depend on how vertices are shared."""
-    n = len(V)
-    edges = np.sort(F[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
-    unique, index = np.unique(edges, axis=0, return_inverse=True)
-    a, b, c = F.T
-    bc, ca, ab = n + index.reshape(-1, 3).T
-    faces = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
-    return np.vstack([V, V[unique].mean(axis=1)]), faces
 
 
 def _split(V, F, some):

@@ -12,6 +12,8 @@ import numpy as np
 
 from facewright.contact import (
     EyeShapes,
+    clear_lips,
+    even_lining,
     find_jaw,
     hold_neck,
     keep_jaw_within,
@@ -48,7 +50,7 @@ def unscanned_face(template, vertices):
 
 def in_place(face, irises=None):
     """A Face with its parts fitted and its lips clear of each other; irises as parts.find_irises gives them."""
-    return part_lips(fit_parts(face, irises=irises))
+    return clear_lips(part_lips(even_lining(fit_parts(face, irises=irises))))
 
 
 def template_rig(template, jobs=1):

@@ -289,7 +289,7 @@ def _may_be_fine(options, names, keep, neutrals):
     except InputError:  # an atlas larger than images may be
         return False
     usual = memory_bytes(neutrals, TEXTURES, layers)
-    return fine <= usual and (options.budget is None or usual <= options.budget)
+    return fine <= usual and (options.budget is None or fine <= options.budget)
 
 
 def _check(options, names, keep):

@@ -112,7 +112,7 @@ def textures_within(budget, neutrals, layers, most, sets=1):
     least = memory_bytes(neutrals, 1, layers, sets)
     raise InputError(
         f"compress: a budget of {budget / 1e6:.4g} MB is too small; one difference texture needs {least / 1e6:.4g} MB, "
-        "so give more or smaller textures"
+        "so give a larger budget or smaller textures"
     )
 
 

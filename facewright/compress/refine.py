@@ -71,18 +71,13 @@ class Pass:
         """
         tiles, k = self.tiles, self.k
         x = tiles.differences(part) if x is None else x
-        corner = weights[self.corners[part]]  # (t, 4, N, K)
-        t = len(corner)
-        rows = np.ascontiguousarray(corner.transpose(0, 1, 3, 2)).reshape(t, 4 * k, tiles.count)
-        gram = (rows @ rows.transpose(0, 2, 1)).reshape(t, 4, k, 4, k)
+        rows = self._corner_rows(weights, part)
+        t = len(rows)
         projected = (rows @ x).reshape(t, 4, k, tiles.channels, -1)
         b = projected[:, 0] * self.basis[0]
         for c in range(1, 4):
             b += projected[:, c] * self.basis[c]
-        a = {}
-        for i in range(k):
-            for j in range(i + 1):
-                a[i, j] = np.ascontiguousarray(gram[:, :, i, :, j]).reshape(t, 16) @ self.products
+        a = self._normal(rows)
         held = {i: x[:, n].reshape(t, tiles.channels, -1) for i, n in enumerate(self.fixed)}
         d = _solve_texels(a, b, k, ridge, held, nearest)
         value = -np.vdot(b, d)
@@ -90,6 +85,36 @@ class Pass:
             left = sum(a[max(h, j), min(h, j)][:, None] * d[:, j] for j in range(k)) - b[:, h]
             value += np.vdot(d[:, h], left)
         return d, value, x
+
+    def round_textures(self, weights, part, ridge, wanted, nearest):
+        """D that can be stored (see solve_textures) and loses least against a wanted D (tiles, K, C, P)."""
+        a, k = self._normal(self._corner_rows(weights, part)), self.k
+        b = ridge * wanted
+        for i in range(k):
+            for j in range(k):
+                b[:, i] += a[max(i, j), min(i, j)][:, None] * wanted[:, j]
+        return _solve_texels(a, b, k, ridge, {}, nearest)
+
+    def blended(self, weights, part, d):
+        """(tiles, N, C, P) what D (tiles, K, C, P) and weights (cells, N, K) make of the differences."""
+        corner = weights[self.corners[part]].transpose(0, 2, 1, 3).reshape(len(d), -1, 4 * self.k)
+        e = (d[:, None] * self.basis[:, None, None]).reshape(len(d), 4 * self.k, -1)
+        return (corner @ e).reshape(len(d), -1, *d.shape[2:])
+
+    def _corner_rows(self, weights, part):
+        """(tiles, 4 K, N) weights of the corners of tiles."""
+        corner = weights[self.corners[part]]  # (t, 4, N, K)
+        return np.ascontiguousarray(corner.transpose(0, 1, 3, 2)).reshape(len(corner), 4 * self.k, -1)
+
+    def _normal(self, rows):
+        """Entries i, j (i >= j) of the K x K matrix of every texel, (tiles, P) each."""
+        t, k = len(rows), self.k
+        gram = (rows @ rows.transpose(0, 2, 1)).reshape(t, 4, k, 4, k)
+        return {
+            (i, j): np.ascontiguousarray(gram[:, :, i, :, j]).reshape(t, 16) @ self.products
+            for i in range(k)
+            for j in range(i + 1)
+        }
 
     def gather(self, weights, ridge, rounding=None):
         """Objective, stencil (rows, columns, 3, 3, K, K) and right-hand side (rows, columns, K, N).

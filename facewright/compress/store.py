@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.compress.contrast import even_contrast
 from facewright.compress.packed import code_scale, nearest_codes, quantise
 from facewright.compress.refine import Pass
 from facewright.compress.threads import in_threads
+from facewright.compress.tiles import CELL
 
 # Values of difference textures beyond this share at either end are clipped, of more while weights settle (2.913 against
 # 2.920 on the faces); so many texels tell where that is.
@@ -75,15 +77,27 @@ def _stored_textures(tiles, weights, ridge, held, exact):
     rounding = texture_rounding(tiles, weights, ridge, held, whole)
     nearest = None if exact else rounding.nearest
     work, flat = Pass(tiles, k, held), np.ascontiguousarray(weights, np.float32).reshape(-1, tiles.count, k)
-    codes = np.empty((len(tiles), k, tiles.channels, tiles.grid.texels), tiles.data.dtype)
+    damping, dtype = ridge * tiles.count, tiles.data.dtype
 
-    def one(part):
+    def solved(part, nearest):
         # Every texel has a system of its own, so scales fall out, and what lies just outside the covered texels,
         # which filters and mip-maps read too, is met as well.
-        x = tiles.differences(part, whole=True)
-        codes[part] = rounding.codes(work.solve_textures(flat, part, ridge * tiles.count, x, nearest)[0])
+        return work.solve_textures(flat, part, damping, tiles.differences(part, whole=True), nearest)[0]
 
-    in_threads(one, tiles.chunks())
+    def gathered(function, dtype):
+        result = np.empty((len(tiles), k, tiles.channels, tiles.grid.texels), dtype)
+
+        def one(part):
+            result[part] = function(part)
+
+        in_threads(one, tiles.chunks())
+        return result
+
+    if tiles.grid.cell < CELL:
+        d = even_contrast(tiles, weights, gathered(lambda part: solved(part, None), np.float32))
+        codes = gathered(lambda part: rounding.codes(work.round_textures(flat, part, damping, d[part], nearest)), dtype)
+    else:
+        codes = gathered(lambda part: rounding.codes(solved(part, nearest)), dtype)
     image = tiles.grid.join(codes.reshape(len(tiles), -1, tiles.grid.texels))
     image = image.reshape(*image.shape[:2], k, tiles.channels)
     return np.ascontiguousarray(image.transpose(2, 0, 1, 3)), rounding.step, rounding.zero
@@ -123,10 +137,7 @@ def quantise_textures(tiles, d):
 
 def _predicted(tiles, part, textures, weights, work):
     """(t, N, C, P) 0-255 reconstruction of tiles from stored values, clipped."""
-    k = weights.shape[-1]
-    corner = weights[work.corners[part]].transpose(0, 2, 1, 3)  # (t, N, 4, K)
-    e = (textures[:, None] * work.basis[:, None, None]).reshape(len(corner), 4 * k, -1)
-    x = (corner.reshape(len(corner), -1, 4 * k) @ e).reshape(len(corner), -1, tiles.channels, tiles.grid.texels)
+    x = work.blended(weights, part, textures)
     x += tiles.neutral[part, None] * np.float32(tiles.unit)
     return np.clip(x, 0, 255, out=x)
 

@@ -12,16 +12,15 @@ from scipy.spatial import cKDTree
 from facewright.contact.parting import Parting
 from facewright.contact.targets import is_even
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
-from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR, mirrored_name
 from facewright.mesh.adjacency import differing
-from facewright.mesh.seam import seam_sides
+from facewright.mesh.seam import inner_sides
 from facewright.transfer.halves import left_share
 from facewright.transfer.shapes import CORRECTIVE_BASE
 from facewright.working_set import read_working_set
 
 _REACH_MM = {"lip_seam": 25.0, "lid_": 10.0, "nostril": 14.0}  # from these lines: skin that may come to cross
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
-_CORNER_MM = 1.0  # of the lips' line: skin and lining nearest to it may cross as one turned inside out
 _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
 _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
 
@@ -59,7 +58,9 @@ class _Crossings:
             if name.startswith("lid_"):
                 farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
             near |= cKDTree(self.V[line]).query(self.V, distance_upper_bound=reach)[0] < reach
-        lips = self._lips(face, faces)
+        # Skin and lining nearest to a corner of the mouth may cross as one turned inside out.
+        seams = (face.lines[f"lip_seam_{lip}"] for lip in ("upper", "lower"))
+        lips = inner_sides(self.V, faces, *seams, _REACH_MM["lip_seam"])
         self.near = Parting(self.V, faces, near[faces].all(axis=1), asked, farthest, lips)
         if "jawOpen" in targets.names:
             near |= np.abs(targets.delta("jawOpen")[self.at]).max(axis=1) > _MOVES_MM
@@ -68,22 +69,15 @@ class _Crossings:
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]
 
-    def _lips(self, face, faces):
-        """Two (k,) bool of the skin: what lies by the upper lip and by the lower one, rather than by a corner."""
-        seams = [face.lines[f"lip_seam_{lip}"] for lip in ("upper", "lower")]
-        seam = self.V[np.concatenate(seams)]
-        from_corner = cKDTree(self.V[seams[0][[0, -1]]]).query(seam)[0]
-        inner = from_corner[cKDTree(seam).query(self.V)[1]] > _CORNER_MM
-        return [side & inner for side in seam_sides(self.V, faces, *seams, _REACH_MM["lip_seam"], split_ends=False)]
-
-    def _apart(self, motions, acts):
-        """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say."""
+    def _apart(self, motions, acts, clean=0):
+        """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say; so many of them,
+        the last ones, have been made clean already."""
         heads = [self.rest + motion for motion in motions]
         far = max(np.abs(motion[self.at]).max(initial=0.0) for motion in motions) > _FAR_MM
         ways_out = [partial(out_of_teeth, self.teeth, head) for head in heads]
         # Outer skin that a shape leaves alone lies outside its region.
         still = self.outer & ~np.any([differing(motion[self.at], 0.0) for motion in motions], axis=0)
-        return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out, still)
+        return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out, still, clean)
 
     def with_shapes(self, targets, run):
         """Targets whose shapes have no crossings, nor the halves of those that have any."""
@@ -96,7 +90,25 @@ class _Crossings:
             shares = [1.0, self.left, 1.0 - self.left] if name in self.halves else [1.0]
             return self._apart([_shared(motion, share, self.at) for share in shares], shares)
 
-        for number, (name, change) in enumerate(zip(targets.names, run(field, targets.names))):
+        def fields(names):
+            """Of a left and a right shape: the two, each by itself first, then what both together need."""
+            alone = [field(name) for name in names]
+            if len(names) == 1:
+                return alone
+            motions = [_plus(targets.delta(name), change, self.at) for name, change in zip(names, alone)]
+            # What one side leaves alone lies outside its region.
+            own = [~self.outer[:, None] | differing(motion[self.at], 0.0)[:, None] for motion in motions]
+            acts = [share * mask for share, mask in zip((self.left, 1.0 - self.left), own)]
+            both = self._apart([sum(motions), *motions], [1.0, *acts], clean=2)
+            return [change + act * both for change, act in zip(alone, acts)]
+
+        asked = _with_twins(targets.names)
+        changes = {
+            name: change for names, found in zip(asked, run(fields, asked)) for name, change in zip(names, found)
+        }
+        for number, name in enumerate(targets.names):
+            # What was asked about with another shape beneath stays with it what it became.
+            change = changes[name] - changes.get(CORRECTIVE_BASE.get(name), 0.0)
             deltas[number, self.at] += change
             for weight, step in targets.in_betweens.get(name, {}).items():
                 extras[step] = _plus(extras[step], weight * change, self.at)
@@ -118,6 +130,14 @@ class _Crossings:
             for name, share in zip(names, shares):
                 extras[name] = _plus(extras[name], share * change, self.at)
         return replace(targets, extras=extras)
+
+
+def _with_twins(names):
+    """Names in tuples: a left and a right shape of the mouth together, since their sides meet at its middle."""
+    lefts = [name for name in names if name.startswith("mouth") and name.endswith("Left") and name != "mouthLeft"]
+    pairs = [(name, mirrored_name(name)) for name in lefts if mirrored_name(name) in names]
+    paired = {name for pair in pairs for name in pair}
+    return [*pairs, *((name,) for name in names if name not in paired)]
 
 
 def _of_pair(pair, targets):

@@ -59,8 +59,10 @@ class MouthOptions:
     tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
     tongue_half  shares of its whole way by which the mouth is parted and the tongue has come at half: first it opens
     once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
-    halves       shapes that get an in-between at half: lips rolled in, which pass round the teeth
-    pressed      share of itself by which such a shape goes on from where outer skin of a lip meets the teeth
+    halves       shapes that get an in-between at half: lips rolled in, which pass round the teeth, and a lip that a jaw
+                 takes forward, which passes round the other
+    rolls        shapes that take lips in; pressed: share of itself by which one goes on from where outer skin meets the
+                 teeth
     pairs        shapes, or both sides of them, that get a corrective together
     """
 
@@ -72,7 +74,8 @@ class MouthOptions:
     once: tuple[str, ...] = ("mouthFunnel", "mouthPucker")
     once_share: float = 0.6
     window_mm: float = 44.0
-    halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
+    halves: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper", "jawForward")
+    rolls: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
     pressed: float = 0.5
     pairs: tuple[tuple[str, str], ...] = PAIRS
 
@@ -141,7 +144,7 @@ class _Mouth:
         sides of a lip would change places.
         """
         deltas = np.array(targets.deltas)
-        for name in set(self.options.halves) & set(targets.names):
+        for name in set(self.options.rolls) & set(targets.names):
             met = self.contact.meets_teeth(targets.delta(name), 1.0 - self.options.pressed)
             deltas[targets.names.index(name)] *= min(1.0, met + self.options.pressed)
         return replace(targets, deltas=deltas)
@@ -156,12 +159,9 @@ class _Mouth:
 
     def with_both_sides(self, targets):
         """Targets of which left and right together keep the lips apart too; each side gets its share."""
-        lefts = [name for name in self._lip_shapes(targets) if name.startswith("mouth") and name.endswith("Left")]
-        pairs = [(name, mirrored_name(name)) for name in lefts if name != "mouthLeft"]
-        pairs = [pair for pair in pairs if pair[1] in targets.names]
+        pairs = self._both_sides(targets)
         lacks = self._each(lambda pair: self._lack(targets, dict.fromkeys(pair, 1.0)), pairs)
-        shares = self.left, 1.0 - self.left
-        return _added(targets, [(lack, dict(zip(pair, shares))) for pair, lack in zip(pairs, lacks)])
+        return self._added_to_sides(targets, pairs, lacks)
 
     def with_flat_corners(self, targets):
         """Targets of which none folds the skin around the lips, as where both pull at the small faces of a corner."""
@@ -245,6 +245,10 @@ class _Mouth:
                 extras[step] = np.array(extras[step])
                 extras[step][self.skin] += weight * push
         targets = replace(targets, deltas=deltas, extras=extras)
+        pairs = self._both_sides(targets)
+        pushes = self._each(lambda pair: self._of_head(tucked(dict.fromkeys(pair, 1.0))), pairs)
+        targets = self._added_to_sides(targets, pairs, pushes)
+        extras = dict(targets.extras)
         drivers = [names for names in targets.correctives.values() if set(names) <= set(poses)]
         for names, push in zip(drivers, self._each(lambda names: tucked(dict.fromkeys(names, 1.0)), drivers)):
             name = corrective_name(names)
@@ -316,6 +320,23 @@ class _Mouth:
         """Names of the shapes that move lips; mouthClose, which comes with jawOpen, apart."""
         motion = np.abs(targets.deltas[:, self.contact.lips]).max(axis=(1, 2))
         return [name for name, most in zip(targets.names, motion) if most > _MOVES_MM and name != "mouthClose"]
+
+    def _both_sides(self, targets):
+        """(left, right) names of the shapes that move lips on one side each."""
+        lefts = [name for name in self._lip_shapes(targets) if name.startswith("mouth") and name.endswith("Left")]
+        pairs = [(name, mirrored_name(name)) for name in lefts if name != "mouthLeft"]
+        return [pair for pair in pairs if pair[1] in targets.names]
+
+    def _added_to_sides(self, targets, pairs, fields):
+        """Targets with a field (n, 3) for each pair of a left and a right shape, of which each gets its side."""
+        shares = self.left, 1.0 - self.left
+        return _added(targets, [(field, dict(zip(pair, shares))) for pair, field in zip(pairs, fields)])
+
+    def _of_head(self, field):
+        """(n, 3) a field of the skin (k, 3) as one of the whole head."""
+        result = np.zeros_like(self.face.vertices)
+        result[self.skin] = field
+        return result
 
     def _lack(self, targets, pose, weights=None, acts=None, closed=False):
         """(n, 3) what a pose lacks along its way; weights, acts, closed as LipContact.apart takes them."""

@@ -19,7 +19,7 @@ class MouthCloseOptions:
     """
 
     zone_mm: float = 9.0
-    reach_mm: float = 30.0
+    reach_mm: float = 36.0
     share: float = 0.25
 
 

@@ -3,9 +3,10 @@
 Contact asks vertices, and stops at a depth that nobody sees; edges of the small faces at a corner of the mouth and in
 shut lids still pass through each other. Here the pairs of faces that cross are found exactly and moved apart along the
 normals between them, as far as they reach past each other (position-based constraints: Mueller et al. 2007), until none
-crosses. Which of two sheets belongs in front is known of an upper lip and a lower one. Else it is told by the winding
-number: between skins that meet it is that of flesh on either side of the crossing; between a skin and its own lining,
-turned inside out, that of air. Asked of lips too, a thin one that has crumpled is sent through the other.
+crosses. What goes on crossing is crumpled: its motion is made smooth in space as far as that helps, and it is moved
+apart again. Which of two sheets belongs in front is known of an upper lip and a lower one. Else it is told by the
+winding number: between skins that meet it is that of flesh on either side of the crossing; between a skin and its own
+lining, turned inside out, that of air. Asked of lips too, a thin one that has crumpled is sent through the other.
 """
 
 from __future__ import annotations
@@ -17,16 +18,18 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from facewright.mesh.adjacency import differing, touching
+from facewright.mesh.adjacency import differing, dilate, touching
+from facewright.mesh.ease import eased
 from facewright.mesh.folds import folded_by_shape, laid_flat
 from facewright.mesh.intersect import intersections_of, self_intersections
+from facewright.mesh.laplacian import lumped_mass
 from facewright.mesh.normals import lengths, max_norms, normalized, vertex_normals
 from facewright.mesh.overlap import crossing_points, overlap_along
 from facewright.mesh.winding import winding_numbers
 
 _FOLD = 10.0  # crossings that a folded face counts as
 _FLAT_ROUNDS = 3
-_STILL_MM, _ABOUT_MM = 1e-4, 1.0
+_STILL_MM, _ABOUT_MM, _DEEP_MM = 1e-4, 1.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,9 @@ class PartingOptions:
     shorter   share of the other way out at which one is taken whatever lies there
     least_act where the correction acts less it is taken to act so much, or it would grow large for the rest
     patience  rounds of looking for crossings without one that leaves fewer; sweeps over what has been found, in each
+    eased_mm  widths within which motion is made smooth around crossings that stay, one after the other; eased_shares of
+              the way there that are tried; eased_rings of faces around such a crossing that hang together with it;
+              eased_patience as before
     """
 
     gap_mm: float = 0.005
@@ -52,6 +58,10 @@ class PartingOptions:
     least_act: float = 0.25
     patience: int = 6
     sweeps: int = 6
+    eased_mm: tuple[float, ...] = (1.0, 2.0, 0.5)
+    eased_shares: tuple[float, ...] = (0.25, 0.5, 0.75, 1.0)
+    eased_rings: int = 6
+    eased_patience: int = 3
 
 
 class Parting:
@@ -68,6 +78,7 @@ class Parting:
         self.faces = np.ascontiguousarray(local.reshape(-1, 3))
         self.rest, self.asked, self._n = vertices[self.used], asked[near], len(vertices)
         self._farthest = farthest[self.used, None]
+        self._mass = lumped_mass(self.rest, self.faces)
         self._ring = _mean_of_ring(self.faces, len(self.used))
         self._side = np.zeros(len(self.faces), int)  # 1 and 2 for faces of the two sides
         for number, side in enumerate(sides, start=1):
@@ -77,30 +88,77 @@ class Parting:
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
         self._beyond = -np.asarray(igl.fast_winding_number(self.rest, self.faces, outside)).reshape(-1)
 
-    def __call__(self, poses, acts, ways_out, still=None):
+    def __call__(self, poses, acts, ways_out, still=None, clean=0):
         """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
 
         poses  sequence of (n, 3); acts: how strongly the correction acts in each, a number or (n, 1)
         ways_out  for each a function of points (k, 3): their ways (k, 3) out of what skin must not enter
         still  (n,) bool: vertices that stay where they are
+        clean  how many poses, the last ones, are known to have none: they are asked about where the correction acts
         """
         farthest = self._farthest if still is None else np.where(still[self.used, None], 0.0, self._farthest)
         field = np.zeros_like(self.rest)
         asked = zip(poses, acts, ways_out)
         poses = [_Pose(pose[self.used], self._cut(act), way_out) for pose, act, way_out in asked]
+        for pose in poses[len(poses) - clean :]:
+            pose.looked = pose.skin(field)
+        field, faults = self._parted(poses, field, farthest, self.options.patience)
+        for width in self.options.eased_mm:
+            other = self._eased(poses, field, farthest, width) if faults else None
+            if other is None:
+                break
+            other, of_other = self._parted(poses, other, farthest, self.options.eased_patience)
+            if of_other < faults:
+                field, faults = other, of_other
+        return self._of_skin(field)
+
+    def _parted(self, poses, field, farthest, patience):
+        """A field (k, 3), from the given one on, that leaves the fewest faults, and how many."""
         best, fewest, waited = field, np.inf, 0
-        while waited < self.options.patience:
-            left = sum(self._look(pose, field) for pose in poses)
-            if not left:
-                return self._of_skin(field)
-            faults = left + _FOLD * sum(self._folds(pose, field) for pose in poses if len(pose.met))
+        while waited < patience:
+            faults = self._faults(poses, field)
+            if not faults:
+                return field, 0
             waited += 1
             if faults < fewest:
                 best, fewest, waited = field, faults, 0
             for pose in poses:
                 for correction in (self._apart, self._flat, self._out):
                     field = _within(field + correction(pose, field), farthest)
-        return self._of_skin(best)
+        return best, fewest
+
+    def _faults(self, poses, field):
+        """Crossings of poses; where there have been any, folded faces and what the correction takes into solids too."""
+        left = sum(self._look(pose, field) for pose in poses)
+        met = [pose for pose in poses if len(pose.met)]
+        return left + sum(_FOLD * self._folds(pose, field) + self._deep(pose, field) for pose in met)
+
+    def _deep(self, pose, field):
+        """Number of vertices that the correction moves and that lie deep in what they must not enter."""
+        moved = np.flatnonzero(differing(field, 0.0))
+        return int((lengths(pose.way_out(pose.skin(field)[moved])) > _DEEP_MM).sum()) if len(moved) else 0
+
+    def _eased(self, poses, field, farthest, width):
+        """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults.
+
+        None where nothing crosses.
+        """
+        if not sum(self._look(pose, field) for pose in poses):
+            return None
+        way = np.zeros_like(field)
+        for pose in poses:
+            if len(pose.pairs):
+                way += self._smoothly(pose, field, width) / np.maximum(pose.act, self.options.least_act)
+        ways = [_within(field + share * way, farthest) for share in self.options.eased_shares]
+        return min(ways, key=lambda field: self._faults(poses, field))
+
+    def _smoothly(self, pose, field, width):
+        """(k, 3) what makes the motion of a pose smooth around its crossings; only what hangs together with one counts,
+        or an open mouth would be drawn shut."""
+        crossing = np.zeros(len(field), bool)
+        crossing[self.faces[pose.pairs]] = True
+        among = dilate(crossing, self.faces, self.options.eased_rings)
+        return eased(self.rest, self._mass, pose.skin(field) - self.rest, crossing, width, among)
 
     def _of_skin(self, field):
         result = np.zeros((self._n, 3))
@@ -144,7 +202,7 @@ class Parting:
 
     def _flat(self, pose, field):
         """(k, 3) what turns back faces of a pose that have been folded."""
-        if not len(pose.pairs):
+        if not len(pose.met):
             return 0.0
         now = pose.skin(field)
         flat = laid_flat(self.rest, now, self.faces, np.ones(len(now)), rounds=_FLAT_ROUNDS)
@@ -152,7 +210,7 @@ class Parting:
 
     def _out(self, pose, field):
         """(k, 3) what takes vertices of a pose that the correction moves out of what they must not enter."""
-        moved = np.flatnonzero(differing(field, 0.0)) if len(pose.pairs) else []
+        moved = np.flatnonzero(differing(field, 0.0)) if len(pose.met) else []
         way = np.zeros_like(field)
         if len(moved):
             way[moved] = pose.way_out(pose.skin(field)[moved])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import unique_edges
 
@@ -31,3 +32,14 @@ def seam_sides(vertices, faces, upper, lower, reach_mm=8.0, *, split_ends=True):
     corners = [upper[0], upper[-1]]
     is_upper[corners] = is_lower[corners] = False
     return is_upper, is_lower
+
+
+def inner_sides(vertices, faces, upper, lower, reach_mm, corner_mm=1.0):
+    """Masks (n,) of the two sides of a seam as seam_sides gives them, without what is nearest to an end of it.
+
+    corner_mm  from an end: part of the seam that counts as that end
+    """
+    seam = vertices[np.concatenate([upper, lower])]
+    from_corner = cKDTree(vertices[upper[[0, -1]]]).query(seam)[0]
+    inner = from_corner[cKDTree(seam).query(vertices)[1]] > corner_mm
+    return [side & inner for side in seam_sides(vertices, faces, upper, lower, reach_mm, split_ends=False)]

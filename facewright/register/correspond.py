@@ -12,8 +12,11 @@ from scipy.spatial import cKDTree
 from facewright.mesh.adjacency import border_vertices, vertex_adjacency
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_areas, face_normals, vertex_normals
+from facewright.mesh.subdivide import split_in_four, with_midpoints
 
 SMOOTH_MM, MAX_ROUNDS = 4.6, 20
+FINE_MM = 3.0
+"""Longer edges are split before a surface is smoothed."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +83,22 @@ class Target:
     def smoothed(self, edge_mm):
         """The same Target without the scanner's noise: what is finer than about SMOOTH_MM is gone, the rest stays.
 
-        edge_mm: how long the scan's edges are; a coarse scan has no such noise, and is left as it is
+        edge_mm: how long the scan's edges are. Of a coarse scan its facets go: of 3,000 triangles, corners stand 0.1 to
+        0.2 mm before a face's true surface and middles as much behind it, and the model slides to where these have it
+        (twelve heads of known truth 0.98 mm off with the facets, 0.92 without).
         """
-        rounds = min(MAX_ROUNDS, round((SMOOTH_MM / max(edge_mm, 1e-6)) ** 2))
         smooth = copy(self)
-        smooth.vertices = _low_pass(self.vertices, self.faces, rounds)
-        smooth.surface = Surface(smooth.vertices, self.faces)
-        smooth.normals = vertex_normals(smooth.vertices, self.faces)
+        smooth_mm = max(SMOOTH_MM, edge_mm)
+        while edge_mm > FINE_MM:
+            edges, smooth.faces = split_in_four(smooth.faces, len(smooth.vertices))
+            for name in ("vertices", "roughness", "openness"):
+                setattr(smooth, name, with_midpoints(getattr(smooth, name), edges))
+            edge_mm /= 2
+        rounds = min(MAX_ROUNDS, round((smooth_mm / max(edge_mm, 1e-6)) ** 2))
+        smooth.surface = Surface(_low_pass(smooth.vertices, smooth.faces, rounds), smooth.faces)
+        smooth.vertices = smooth.surface.vertices
+        smooth.normals = vertex_normals(smooth.vertices, smooth.faces)
+        smooth.border = border_vertices(smooth.faces, len(smooth.vertices))
         return smooth
 
     def match(self, points, normals, *, max_distance, max_angle_deg=60.0, tau=None):

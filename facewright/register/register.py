@@ -53,9 +53,9 @@ class RegisterOptions:
 # levels from 45 down to 5 took 1.5 core seconds more, and lips of hm08 were 0.58 mm off instead of 0.57.
 LEVELS = ((10.0, 5.0, 3.0, 10.0),)
 DETAIL = ((2.0, 0.5, 1.5, 4.0),)
-# Facets are no detail: a scan cut to 3,000 triangles (edges of 11 mm) lands 0.58 mm from the full one with all modes
-# and as many observations as a fine scan, 0.50 with the coarse modes and fewer. The last level makes it worse by 0.03.
-# A scan with edges of 4.6 mm needs that: its lip seam is 0.9 mm off without, 0.5 with.
+# Facets are no detail: the last level draws the skin of a scan cut to 3,000 triangles (edges of 11 mm) 0.03 mm farther
+# from the full one's, and what it is drawn to is the smoothed scan. A scan with edges of 4.6 mm needs that level: its
+# lip seam is 0.9 mm off without, 0.5 with.
 FACETS_MM = 8.0
 
 
@@ -78,8 +78,9 @@ def register(scan, landmarks, template, options=None, placed=()):
     closed, borders, pairs = _read_eyes(scan, template, basis, pairs, options.model)
     edge_mm = face_edge_mm(scan.vertices, scan.faces)
     finely = edge_mm <= FACETS_MM
+    smooth = target.smoothed(edge_mm)
     rules = skin_rules(template)
-    model, names = _fit_model(template, basis, target.smoothed(edge_mm), rules, pairs, closed, options.model, finely)
+    model, names = _fit_model(template, basis, smooth, rules, pairs, closed, options.model, finely)
     model = _with_ears(template, target, model)
     leading, line_stats = leading_lines(scan, template, model, pairs, closed, borders)
     stop = template.skin.vertices[1]
@@ -87,8 +88,8 @@ def register(scan, landmarks, template, options=None, placed=()):
     rules, bald = without_hair(rules, template, model.vertices, target)
     hidden = _hidden_ears(template, target, model.vertices)[:stop]
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
-    levels = LEVELS + DETAIL if finely else LEVELS
-    skin, matches = fit_skin(model.vertices[:stop], faces, target, rules, leading, levels)
+    surface, levels = (target, LEVELS + DETAIL) if finely else (smooth, LEVELS)
+    skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, levels)
     skin = facing_the_scan(template, skin, faces, matches, "lips")
     fit = model.vertices.copy()
     fit[:stop] = without_knots(template, facing_the_scan(template, skin, faces, matches, "eyes"), faces)
@@ -184,12 +185,11 @@ def _fit_model(template, basis, target, rules, pairs, closed, options, finely):
     common = (faces, trust, rules, target)
     landmarks = (pairs.points, pairs.rows, pairs.weights)
     mean = template.vertices
-    local = basis if finely else basis.first(options.coarse_modes)
 
     def hidden(vertices):
         return _hidden_ears(template, target, vertices)
 
-    model = fit_model(mean, local, expressions, *common, landmarks, options, hidden)
+    model = fit_model(mean, basis, expressions, *common, landmarks, options, hidden)
     seen = np.where(hidden(model.vertices), 0.0, trust)
     return refine_model(model, mean, template.identity_basis, faces, seen, rules, target, finely), names
 

@@ -112,10 +112,10 @@ def test_images_no_wider_than_a_weight_texel(shape):
     assert packed.report["mean_rmse"] <= constant.report["mean_rmse"] + 0.3
 
 
-def unrelated(n, size=96, seed=0):
+def unrelated(n, size=96, seed=0, blur=2):
     """A neutral and n textures of blurred noise each its own."""
     rng = np.random.default_rng(seed)
-    fields = [gaussian_filter(rng.normal(0, 1, (size, size, 3)), (2, 2, 0)) for _ in range(n + 1)]
+    fields = [gaussian_filter(rng.normal(0, 1, (size, size, 3)), (blur, blur, 0)) for _ in range(n + 1)]
     return [np.clip(128 + 200 * field, 0, 255).astype(np.uint8) for field in fields]
 
 
@@ -136,6 +136,15 @@ def test_finer_weights_never_take_more_memory(n, shapes):
     neutral, *images = unrelated(n, 48)
     packed = facezip(neutral, images, options=FacezipOptions(shapes=shapes))
     assert (packed.cell, len(packed.textures)) == (8, 4)
+
+
+def test_finer_weights_are_open_to_a_budget_that_they_fit():
+    neutral, *images = unrelated(20)
+    finer, published = (facezip(neutral, images, options=FacezipOptions(textures=k)) for k in (None, 4))
+    budget = (finer.memory_bytes() + published.memory_bytes()) // 2  # too small for four difference textures
+    packed, fewer = (facezip(neutral, images, options=FacezipOptions(budget=b)) for b in (budget, budget // 2))
+    assert (packed.cell, packed.memory_bytes()) == (4, finer.memory_bytes()) and packed.memory_bytes() <= budget
+    assert fewer.cell == 8 and fewer.memory_bytes() <= budget // 2
 
 
 def test_textures_that_share_their_structure_keep_four_difference_textures():

@@ -64,6 +64,20 @@ def test_what_is_rounded_is_made_up_for_by_the_next():
     assert errors["one by one"] < 0.6 * errors["each"]
 
 
+def test_what_is_rounded_towards_the_solution_is_the_rounded_solution():
+    tiles, _ = tiles_of()
+    k, part, step = 3, np.arange(len(tiles)), np.float32(4)
+
+    def nearest(_, values):
+        return np.rint(values / step) * step
+
+    work, flat = Pass(tiles, k), random_weights(tiles, k).reshape(-1, tiles.count, k)
+    plain, rounded = (work.solve_textures(flat, part, RIDGE, nearest=each)[0] for each in (None, nearest))
+    again = work.round_textures(flat, part, RIDGE, plain, nearest)
+    assert (again != rounded).mean() < 1e-3  # but for what lies on the edge between two steps
+    assert (work.round_textures(flat, part, RIDGE, rounded, nearest) == rounded).all()
+
+
 def test_settled_weights_suit_what_is_stored():
     tiles, _ = tiles_of((96, 96), 16)
     gram = gram_matrix(tiles)

@@ -67,3 +67,30 @@ def test_pairs_are_made_of_sound_shapes(face, targets):
     seen = []
     part_crossings(face, targets, pairs=lambda sound: seen.append(sound) or sound)
     assert [new_crossings(face, delta) for delta in seen[0].deltas] == [0, 0, 0]
+
+
+def test_both_sides_together_have_none(face):
+    """Each side by itself leaves the lips apart in the middle, and the two add up to more."""
+    lower = np.zeros(len(face.vertices), bool)
+    lower[: len(face.regions["lip_lower"])] = face.regions["lip_lower"]
+    line = face.vertices[face.lines["lip_seam_lower"]]
+    near = np.exp(-(np.linalg.norm(face.vertices - line[len(line) // 2], axis=1) ** 2) / 20.0) * lower
+    left = left_share(face.template)
+    deltas = np.zeros((2, *face.vertices.shape))
+    deltas[:, :, 1] = 0.25 * near * np.stack([left, 1.0 - left])
+    targets = Targets(("mouthPressLeft", "mouthPressRight"), deltas)
+    assert new_crossings(face, deltas.sum(axis=0)) > 10
+    parted = part_crossings(face, targets)
+    assert [new_crossings(face, delta) for delta in (*parted.deltas, parted.deltas.sum(axis=0))] == [0, 0, 0]
+    change = np.abs(parted.deltas - deltas).max(axis=2)
+    skin = face.template.vertices[:, 0]
+    assert change[0, skin < -25.0].max() < 0.01 and change[1, skin > 25.0].max() < 0.01
+
+
+def test_what_lies_on_another_shape_follows_its_correction(face, targets):
+    """mouthClose undoes jawOpen: where this is corrected the two together go on as they were."""
+    opened = targets.deltas[1]
+    names, deltas = ("jawOpen", "mouthClose"), np.array([opened, -opened])
+    parted = part_crossings(face, Targets(names, deltas))
+    assert np.abs(parted.deltas[0] - opened).max() > 0.01
+    assert np.abs(parted.deltas.sum(axis=0)).max() < 1e-12

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facewright.contact.parting import Parting
+from facewright.contact.parting import Parting, PartingOptions
 from facewright.mesh.folds import folded_by_shape
 from facewright.mesh.intersect import self_intersections
 
@@ -106,3 +106,28 @@ def test_a_thin_lip_goes_back_where_it_came_from(pads):
     middle = np.abs(V[:, :2]).max(axis=1) < 2.0
     assert parted[upper & middle, 2].min() > parted[~upper & middle, 2].max() - 0.05
     assert (parted[V[:, 2] == -1.0, 2] > parted[V[:, 2] == -4.0, 2]).all()  # not turned inside out
+
+
+def test_crumpled_skins_are_eased(pads):
+    """Both skins that meet are crumpled: what parts one pair crosses another, and a smooth motion crosses nothing."""
+    V, F, _ = pads
+    every = np.ones(len(F), bool)
+    pose = pressed(pads, -0.2)
+    rough = np.random.default_rng(1).normal(size=V.shape) * 0.8
+    pose += rough * (np.linalg.norm(V[:, :2], axis=1) < 3.0)[:, None] * np.isin(V[:, 2], (-1.0, 1.0))[:, None]
+    left = {}
+    for widths in ((), PartingOptions.eased_mm):
+        options = PartingOptions(eased_mm=widths)
+        parting = Parting(V, F, every, every, np.full(len(V), 3.0), options=options)
+        left[widths] = len(self_intersections(pose + parting([pose], [1.0], [np.zeros_like]), F))
+    assert left[()] > 0
+    assert left[PartingOptions.eased_mm] == 0
+
+
+def test_poses_that_are_clean_stay_clean(pads, parting):
+    V, F, _ = pads
+    motion = pressed(pads, 0.08) - V
+    near, share = pressed(pads, -0.01), np.clip(0.5 + V[:, :1] / 8.0, 0.0, 1.0)
+    field = parting([V + motion, near], [1.0, share], [np.zeros_like] * 2, clean=1)
+    left = [len(self_intersections(pose + act * field, F)) for pose, act in ((V + motion, 1.0), (near, share))]
+    assert left == [0, 0]
