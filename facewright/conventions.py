@@ -54,6 +54,13 @@ def mirrored_name(shape):
     return shape
 
 
+def mouth_sides(names):
+    """(left, right) names of the shapes that move one side of the mouth each, of those in names; no mouthLeft, which
+    moves all of it."""
+    lefts = [name for name in names if name.startswith("mouth") and name.endswith("Left") and name != "mouthLeft"]
+    return [(name, mirrored_name(name)) for name in lefts if mirrored_name(name) in names]
+
+
 CORRECTIVE_JOIN = "+"
 
 

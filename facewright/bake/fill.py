@@ -21,6 +21,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import dilate, unique_edges
+from facewright.mesh.fade import smooth_step
 from facewright.solve.quadratic import Factorization
 
 TRUSTED_MM = 2.0
@@ -75,8 +76,7 @@ def feather(V, F, outer, share):
     """
     holes = outer & (share < SHOWN_SHARE)
     distance = surface_distance(V, F, holes, FEATHER_MM)
-    t = np.clip((distance - 1.0) / (FEATHER_MM - 1.0), 0.0, 1.0)
-    return np.where(outer & ~holes, t * t * (3 - 2 * t), 0.0)
+    return np.where(outer & ~holes, smooth_step(distance, 1.0, FEATHER_MM), 0.0)
 
 
 def hair_stains(V, F, means, share, hidden, hair):

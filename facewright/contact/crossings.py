@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from facewright.contact.parting import Parting
 from facewright.contact.targets import is_even
 from facewright.contact.teeth import out_of_teeth, rows_of_teeth
-from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR, mirrored_name
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR, mouth_sides
 from facewright.mesh.adjacency import differing
 from facewright.mesh.seam import inner_sides
 from facewright.transfer.halves import left_share
@@ -134,8 +134,7 @@ class _Crossings:
 
 def _with_twins(names):
     """Names in tuples: a left and a right shape of the mouth together, since their sides meet at its middle."""
-    lefts = [name for name in names if name.startswith("mouth") and name.endswith("Left") and name != "mouthLeft"]
-    pairs = [(name, mirrored_name(name)) for name in lefts if mirrored_name(name) in names]
+    pairs = mouth_sides(names)
     paired = {name for pair in pairs for name in pair}
     return [*pairs, *((name,) for name in names if name not in paired)]
 

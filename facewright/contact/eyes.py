@@ -16,8 +16,10 @@ from scipy.spatial.transform import Rotation
 from facewright.contact.gaze import gaze_rotation, look_shapes
 from facewright.contact.lids import LidMotionOptions, Lids
 from facewright.contact.retraction import needed_retraction
+from facewright.contact.rims import from_ends
 from facewright.contact.targets import Targets
 from facewright.conventions import corrective_name, in_between_name
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.normals import max_norms
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
@@ -113,8 +115,7 @@ class _Eye:
         margin = self.V[np.concatenate([upper, lower])]
         distance = cKDTree(margin).query(self.V)[0]
         # A template's own squint may reach far down the cheek, which is cheekSquint's.
-        place = np.clip((_CHEEK_MM[1] - distance) / (_CHEEK_MM[1] - _CHEEK_MM[0]), 0.0, 1.0)
-        self.squints = (place * place * (3.0 - 2.0 * place))[:, None]
+        self.squints = smooth_step(distance, _CHEEK_MM[1], _CHEEK_MM[0])[:, None]
         free = (distance < options.free_mm) & ~held & ~(socket & (distance > 0.5 * options.free_mm))
         self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
         faces = faces[: len(faces) // 2]
@@ -208,7 +209,7 @@ class _Eye:
         turn_u = wanted_u - self.lids.angles(pose[upper])
         turn_l = wanted_l - self.lids.angles(pose[lower])
         # Towards the canthi, which stay with the skin, the margins do too: else they would be torn off the corner.
-        turns = [turn * _ramp(self.V[c]) for turn, c in ((turn_u, upper), (turn_l, lower))]
+        turns = [turn * smooth_step(from_ends(self.V[c], _CORNER_MM)) for turn, c in ((turn_u, upper), (turn_l, lower))]
         return self.lids.settled(self.lids.turned(pose, *turns, slides=self.lids.spacing(pose)))
 
     def _look(self, direction, own, weight):
@@ -232,13 +233,6 @@ class _Eye:
         delta[self.skin] = pose - (self.V if base is None else base)
         delta[max_norms(delta) < 1e-4] = 0.0
         return delta
-
-
-def _ramp(chain):
-    """(k,) 0 at the canthi, 1 from _CORNER_MM on along a margin."""
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
-    share = np.clip(np.minimum(steps, steps[-1] - steps) / _CORNER_MM, 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)
 
 
 def _profile(chain):

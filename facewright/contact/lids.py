@@ -16,8 +16,9 @@ from scipy.spatial import cKDTree
 
 from facewright.contact.axes import EyeAxes
 from facewright.contact.meeting import Meeting, along_line
-from facewright.contact.rims import FirmRims, from_ends, smooth_step
+from facewright.contact.rims import FirmRims, from_ends
 from facewright.mesh.adjacency import unique_edges
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.folds import laid_flat
 from facewright.mesh.normals import normalized
 from facewright.mesh.spread import SmoothSpread
@@ -269,7 +270,7 @@ class Lids:
         """
         ball = ball or self.ball
         away = cKDTree(shut[self.margin]).query(shut, distance_upper_bound=_ALONE_MM)[0]
-        share = smooth_step((_ALONE_MM - away) / (_ALONE_MM - _AS_ONE_MM))[:, None]
+        share = smooth_step(away, _ALONE_MM, _AS_ONE_MM)[:, None]
         along = shut @ self.axis
         ends = self.lower[[0, -1]]
         turns = self._waved(along, along[self.lower], turn)
@@ -308,6 +309,5 @@ class Lids:
         radius = ball.surface_radius(points) + self.options.closed_mm
         for canthus in canthi:
             beyond = ball.gap(canthus[None])[0] - self.options.closed_mm
-            share = np.clip(1.0 - np.linalg.norm(points - canthus, axis=1) / _ENDS_MM, 0.0, 1.0)
-            radius = radius + beyond * share * share * (3.0 - 2.0 * share)
+            radius = radius + beyond * smooth_step(1.0 - np.linalg.norm(points - canthus, axis=1) / _ENDS_MM)
         return radius

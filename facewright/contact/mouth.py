@@ -22,8 +22,9 @@ from facewright.conventions import (
     SHUT_SHAPES,
     corrective_name,
     in_between_name,
-    mirrored_name,
+    mouth_sides,
 )
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.folds import laid_flat
 from facewright.solve.procrustes import best_rotation
 from facewright.transfer.shapes import even_cut
@@ -122,8 +123,7 @@ class _Mouth:
         still = skull if skull.any() else face.regions["outer"]
         self.forward = best_rotation(template.vertices[still], face.vertices[still])[:, 2]
         self.contact = LipContact(face.vertices, self.faces, self.seams, face.regions["outer"], teeth, options.lips)
-        share = np.clip(0.5 + template.vertices[:, 0] / options.window_mm, 0.0, 1.0)
-        self.left = (share * share * (3 - 2 * share))[:, None]
+        self.left = smooth_step(0.5 + template.vertices[:, 0] / options.window_mm)[:, None]
 
     def with_arc(self, targets):
         """Targets whose jawOpen passes the arc at half; unchanged where the template has no jaw."""
@@ -323,9 +323,8 @@ class _Mouth:
 
     def _both_sides(self, targets):
         """(left, right) names of the shapes that move lips on one side each."""
-        lefts = [name for name in self._lip_shapes(targets) if name.startswith("mouth") and name.endswith("Left")]
-        pairs = [(name, mirrored_name(name)) for name in lefts if name != "mouthLeft"]
-        return [pair for pair in pairs if pair[1] in targets.names]
+        moving = set(self._lip_shapes(targets))
+        return [pair for pair in mouth_sides(targets.names) if pair[0] in moving]
 
     def _added_to_sides(self, targets, pairs, fields):
         """Targets with a field (n, 3) for each pair of a left and a right shape, of which each gets its side."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.mesh.fade import smooth_step
+
 FADE_MM = 25.0
 
 
@@ -14,7 +16,7 @@ def hold_neck(face, deltas):
     if ring is None or not np.abs(deltas[:, ring]).max(initial=0.0) > 0.0:
         return deltas
     skin = face.template.skin.vertex_slice
-    share = np.clip(cKDTree(face.vertices[ring]).query(face.vertices[skin])[0] / FADE_MM, 0.0, 1.0)
+    away = cKDTree(face.vertices[ring]).query(face.vertices[skin])[0]
     result = np.array(deltas)
-    result[:, skin] *= (share * share * (3 - 2 * share))[:, None]
+    result[:, skin] *= smooth_step(away / FADE_MM)[:, None]
     return result

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.normals import normalized
 
 _ENDS_MM = 2.0  # from a canthus: there it sets in
@@ -78,16 +79,10 @@ def _hung(vertices, side, line):
     nearest = away.argmin(axis=1)
     k = np.arange(len(side))
     share, ends = share[k, nearest], from_ends(vertices[line], _CORNER_MM)
-    weight = smooth_step((_SOFT_MM - away[k, nearest]) / (_SOFT_MM - _FIRM_MM))
+    weight = smooth_step(away[k, nearest], _SOFT_MM, _FIRM_MM)
     inner = smooth_step((1.0 - share) * ends[nearest] + share * ends[nearest + 1])
     hangs = weight > 0.0
     return side[hangs], nearest[hangs], share[hangs], weight[hangs], inner[hangs]
-
-
-def smooth_step(share):
-    """Shares cut to 0..1, without an edge where they reach either."""
-    share = np.clip(share, 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)
 
 
 def from_ends(chain, reach_mm=_ENDS_MM):

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import border_vertices
 from facewright.mesh.closest import Surface
+from facewright.mesh.fade import smooth_step
 
 _ASKED = 0.5  # lifted by less than this share is the root, which lies in the floor of the mouth
 
@@ -69,11 +70,9 @@ def _sinks(vertices, faces, options):
     z = vertices[:, 2]
     share = (z - z.min()) / np.ptp(z)
     start, full = options.body
-    t = np.clip((start - share) / (start - full), 0.0, 1.0)
     border = border_vertices(faces, len(vertices))
     held = cKDTree(vertices[border]).query(vertices)[0] / options.border_mm if border.any() else 1.0
-    held = np.clip(held, 0.0, 1.0)
-    return t * t * (3 - 2 * t) * held * held * (3 - 2 * held)
+    return smooth_step(share, start, full) * smooth_step(held)
 
 
 def over_the_lip(face, motions, way, options=None):
@@ -109,8 +108,7 @@ def _lifts(vertices, options):
     """(k,) 0..1: how far each vertex of a tongue (k, 3) at rest is lifted with its tip."""
     z = vertices[:, 2]
     start, full = options.front
-    t = np.clip(((z - z.min()) / np.ptp(z) - start) / (full - start), 0.0, 1.0)
-    return t * t * (3 - 2 * t)
+    return smooth_step((z - z.min()) / np.ptp(z), start, full)
 
 
 class _Flesh:

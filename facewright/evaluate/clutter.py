@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.evaluate.procedural import fractal_noise, smoothstep
+from facewright.evaluate.procedural import fractal_noise
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.normals import vertex_normals
 from facewright.mesh.raster import RayScene
 
@@ -12,7 +13,7 @@ from facewright.mesh.raster import RayScene
 def hair_height(points, scalp_depth, seed, *, thickness=9.0):
     """(k,) mm that hair stands off the head at points (k, 3); scalp_depth (k,) mm inside the hairline, < 0 outside."""
     lumps = 0.65 + 0.6 * fractal_noise(points, 16.0, seed, 3)
-    return thickness * smoothstep(scalp_depth, 0.0, 14.0) * np.clip(lumps, 0.15, None)
+    return thickness * smooth_step(scalp_depth, 0.0, 14.0) * np.clip(lumps, 0.15, None)
 
 
 def strands(surface, starts, directions, rng, *, length=45.0, width=4.0, height=3.0):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.mesh.fade import smooth_step
+
 _PRIMES = np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)
 _MASK = np.uint64(0xFFFFFFFF)
 
@@ -21,8 +23,7 @@ def value_noise(points, scale, seed=0):
     """(k,) smooth noise in -1..1 at points (k, 3); scale in mm between independent values."""
     cell_position = np.asarray(points, float) / scale
     base = np.floor(cell_position)
-    t = cell_position - base
-    t = t * t * (3 - 2 * t)
+    t = smooth_step(cell_position - base)
     result = np.zeros(len(cell_position))
     for corner in np.ndindex(2, 2, 2):
         weight = np.prod(np.where(np.array(corner) == 1, t, 1 - t), axis=1)
@@ -52,9 +53,3 @@ def speckles(points, spacing, radius, seed=0, share=1.0):
         distance = np.linalg.norm(position - place, axis=1) * spacing
         result = np.maximum(result, present * np.clip(1.5 - distance / size, 0, 1))
     return np.minimum(result, 1.0)
-
-
-def smoothstep(x, low, high):
-    """0 below low, 1 above high, smooth between; low > high turns it round."""
-    t = np.clip((np.asarray(x, float) - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)

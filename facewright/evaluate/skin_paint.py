@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.evaluate.procedural import fractal_noise, smoothstep, speckles, value_noise
+from facewright.evaluate.procedural import fractal_noise, speckles, value_noise
 from facewright.evaluate.scanner import eyeball
 from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.fade import smooth_step
 
 BROW_POINTS = {"right": (70, 63, 105, 66, 107), "left": (300, 293, 334, 296, 336)}
 """Landmarks along each brow, from its outer end to the nose."""
@@ -70,24 +71,24 @@ class HeadPaint:
         lips = interpolate(self.lips, self.faces, nearest.faces, nearest.barycentric)
         shade = 1 + 0.05 * fractal_noise(points, 25.0, seed) + 0.04 * fractal_noise(points, 1.6, seed + 1, 2)
         color = np.asarray(look.skin) * shade[:, None]
-        flush = smoothstep(fractal_noise(points, 30.0, seed + 2), -0.2, 0.7)[:, None]
+        flush = smooth_step(fractal_noise(points, 30.0, seed + 2), -0.2, 0.7)[:, None]
         color = color * (1 - flush * [0.0, 0.09, 0.09])
         spots = look.freckles * speckles(points, 4.0, 0.7, seed + 3, share=0.5)[:, None]
         color = color * (1 - spots * [0.25, 0.35, 0.4])
         wrinkles = 1 + 0.07 * value_noise(points * [3.0, 0.4, 0.4], 1.5, seed + 4)
-        color = _mix(color, np.asarray(look.lips) * wrinkles[:, None], smoothstep(lips, 0.25, 0.85))
+        color = _mix(color, np.asarray(look.lips) * wrinkles[:, None], smooth_step(lips, 0.25, 0.85))
         color = self._brow(color, points)
-        color = color * (1 - 0.55 * smoothstep(self.seam.query(points)[0], 1.6, 0.2))[:, None]
-        color = color * (1 - 0.65 * smoothstep(self.lids.query(points)[0], 1.5, 0.3))[:, None]
+        color = color * (1 - 0.55 * smooth_step(self.seam.query(points)[0], 1.6, 0.2))[:, None]
+        color = color * (1 - 0.65 * smooth_step(self.lids.query(points)[0], 1.5, 0.3))[:, None]
         if self.nostrils is not None:
-            color = color * (1 - 0.75 * smoothstep(self.nostrils.query(points)[0], 2.0, 0.5))[:, None]
+            color = color * (1 - 0.75 * smooth_step(self.nostrils.query(points)[0], 2.0, 0.5))[:, None]
         return np.clip(color, 0, 1)
 
     def _brow(self, color, points):
         distance, nearest = self.brows.query(points)
         hairs = 0.5 + 0.5 * value_noise(points * [1.0, 0.35, 1.0], 0.7, self.seed + 5)
         width = self.brow_width[nearest]
-        amount = smoothstep(distance / width, 1.25, 0.4) * (0.4 + 0.5 * hairs)
+        amount = smooth_step(distance / width, 1.25, 0.4) * (0.4 + 0.5 * hairs)
         return _mix(color, self.complexion.brows, amount)
 
     def eye(self, points):
@@ -99,12 +100,12 @@ class HeadPaint:
         direction = points - centers
         off_axis = np.linalg.norm(direction[:, :2], axis=1) / radius
         streaks = 1 + 0.25 * value_noise(direction * 1.0, 0.9, self.seed + 6)
-        white = np.array([0.88, 0.85, 0.83]) * (1 - 0.05 * smoothstep(off_axis, 0.5, 0.9))[:, None]
+        white = np.array([0.88, 0.85, 0.83]) * (1 - 0.05 * smooth_step(off_axis, 0.5, 0.9))[:, None]
         iris = np.asarray(self.complexion.iris) * streaks[:, None]
-        color = _mix(white, np.asarray(self.complexion.iris) * 0.35, smoothstep(off_axis, 0.53, 0.47))
-        color = _mix(color, iris, smoothstep(off_axis, 0.46, 0.42))
-        color = _mix(color, (0.03, 0.03, 0.03), smoothstep(off_axis, 0.19, 0.15))
-        return np.clip(color * (1 - 0.6 * smoothstep(self.lids.query(points)[0], 1.2, 0.2))[:, None], 0, 1)
+        color = _mix(white, np.asarray(self.complexion.iris) * 0.35, smooth_step(off_axis, 0.53, 0.47))
+        color = _mix(color, iris, smooth_step(off_axis, 0.46, 0.42))
+        color = _mix(color, (0.03, 0.03, 0.03), smooth_step(off_axis, 0.19, 0.15))
+        return np.clip(color * (1 - 0.6 * smooth_step(self.lids.query(points)[0], 1.2, 0.2))[:, None], 0, 1)
 
     def hair(self, points):
         """(k, 3) sRGB colours of hair: streaks along the strands."""
@@ -152,5 +153,5 @@ def _brow_points(template, vertices):
         low = np.minimum(steps.astype(int), len(points) - 2)
         pieces.append(points[low] + (steps - low)[:, None] * (points[low + 1] - points[low]))
         outer_to_inner = np.linspace(0, 1, 60)
-        widths.append(1.2 + 2.8 * smoothstep(outer_to_inner, -0.1, 0.6) * smoothstep(outer_to_inner, 1.25, 0.85))
+        widths.append(1.2 + 2.8 * smooth_step(outer_to_inner, -0.1, 0.6) * smooth_step(outer_to_inner, 1.25, 0.85))
     return np.vstack(pieces), np.concatenate(widths)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from facewright.mesh.closest import interpolate
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.raster import raster_uv
 from facewright.mesh.render import linear_to_srgb
 from facewright.transfer.eyeball import angle_from
@@ -51,7 +52,7 @@ def eye_colors(directions, axis=(0.0, 0.0, 1.0), look=None):
     color = _sclera(angle, around, look)
     # The limbus is a soft dark ring 1 mm wide: a sharp one is what makes eyes look like buttons.
     front = np.flatnonzero(angle < look.iris_deg + 1.5)
-    edge = _step(angle[front], look.iris_deg - 2.5, look.iris_deg + 1.5)[:, None]
+    edge = smooth_step(angle[front], look.iris_deg - 2.5, look.iris_deg + 1.5)[:, None]
     color[front] = _iris(angle[front], around[front], look) * (1 - edge) + color[front] * edge
     return color
 
@@ -82,7 +83,7 @@ def _veins(angle, around):
         a = angle[sector]
         wander = 0.05 * np.sin(0.16 * a + waves[0]) + 0.025 * np.sin(0.45 * a + waves[1])
         fork = 0.012 * np.maximum(a - fork_at, 0)
-        strength, width = most * _step(a, first, first + 24), 0.004 + 0.005 * _step(a, 45, 80)
+        strength, width = most * smooth_step(a, first, first + 24), 0.004 + 0.005 * smooth_step(a, 45, 80)
         for branch in (-0.5, 0.5):
             off = around[sector] - np.float32(start) - wander - branch * fork
             veins[sector] = np.maximum(veins[sector], strength * np.exp(-((off / width) ** 2)))
@@ -102,9 +103,9 @@ def _iris(angle, around, look):
     tint = np.exp(warmth[:, None] * [0.35, 0.05, -0.5])
     if ring.any():
         tint = tint / (light[ring, None] * tint[ring]).mean(axis=0)
-    rim = 1 - 0.75 * _step(radius, 0.80, 1.0)
+    rim = 1 - 0.75 * smooth_step(radius, 0.80, 1.0)
     color = np.array(look.iris_color or BROWN) * np.maximum(light * rim, 0.0)[:, None] * tint
-    open_ = _step(angle, look.pupil_deg - 1.0, look.pupil_deg + 0.7)[:, None]
+    open_ = smooth_step(angle, look.pupil_deg - 1.0, look.pupil_deg + 0.7)[:, None]
     return color * open_ + _DARK * (1 - open_)
 
 
@@ -150,7 +151,7 @@ def _crypts(radius, around):
 
 def _furrows(radius, around):
     circles = np.cos(2 * np.pi * 5.5 * (radius + 0.015 * np.sin(4 * around) + 0.01 * np.sin(7 * around)))
-    folds = np.clip(circles - 0.5, 0, 1) * _step(radius, 0.42, 0.6)
+    folds = np.clip(circles - 0.5, 0, 1) * smooth_step(radius, 0.42, 0.6)
     ring = _collarette(around, radius, 0.28, 13, 0.02)
     return 1.0 + 0.15 * _threads(around, radius, 110, 5) - 0.5 * folds + 0.35 * ring, 0.8 * ring
 
@@ -183,12 +184,6 @@ PATTERNS = {
     "speckled": _speckled,
 }
 """name -> function of radius (k,), 0 at the pupil and 1 at the limbus, and the angle around (k,): light and warmth."""
-
-
-def _step(value, low, high):
-    """Smooth step from 0 at low to 1 at high."""
-    t = np.clip((value - low) / (high - low), 0.0, 1.0)
-    return t * t * (3 - 2 * t)
 
 
 def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from facewright.data import Skeleton
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.laplacian import cotangent_laplacian, lumped_mass
 from facewright.solve.quadratic import Factorization
 
@@ -92,5 +93,4 @@ def jaw_weights(vertices, faces, jaw_open, hinge_point, angle, still, *, smooth_
 
 def neck_blend(vertices, bottom, top):
     """(n,) 0 below height bottom (all neck), 1 above height top (all head), smooth between."""
-    t = np.clip((vertices[:, 1] - bottom) / (top - bottom), 0.0, 1.0)
-    return t * t * (3 - 2 * t)
+    return smooth_step(vertices[:, 1], bottom, top)

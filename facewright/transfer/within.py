@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from facewright.conventions import INTERPUPILLARY_MM
+from facewright.mesh.fade import smooth_step
 from facewright.transfer.eyeball import carried_eyeball
 from facewright.working_set import read_working_set, region_depth
 
@@ -43,8 +44,7 @@ def region_shares(face, names):
         key = word.region, word.side
         if key not in fades:
             depth = region_depth(face.vertices[skin], face.lines, words.regions[word.region], word.side, scale)
-            share = np.clip(depth / FADE_MM, 0.0, 1.0)
-            fades[key] = np.where(outer, share * share * (3 - 2 * share), 1.0)[:, None]
+            fades[key] = np.where(outer, smooth_step(depth / FADE_MM), 1.0)[:, None]
         yield fades[key]
 
 

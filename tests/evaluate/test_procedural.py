@@ -40,8 +40,3 @@ def test_speckles_cover_a_share_and_stay_in_range(points):
     assert spots.min() >= 0 and spots.max() <= 1
     assert 0.005 < (spots > 0.3).mean() < 0.3
     assert not procedural.speckles(points, 4.0, 0.8, 1, share=0.0).any()
-
-
-def test_smoothstep_goes_both_ways():
-    assert procedural.smoothstep([-1, 0.5, 2], 0, 1).tolist() == [0, 0.5, 1]
-    assert procedural.smoothstep([-1, 0.5, 2], 1, 0).tolist() == [1, 0.5, 0]
