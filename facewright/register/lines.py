@@ -42,13 +42,17 @@ class Crease:
 
 @dataclass(frozen=True)
 class CreaseOptions:
-    """Band and resolution of the search, mm; overshoot: how far beyond both ends of the model's line to look."""
+    """Band and resolution of the search, mm; overshoot: how far beyond both ends of the model's line to look.
+
+    prior_sigma: how far from the model's line a crease may run. 3.5 drew faint corners of a filled mouth to a line that
+    was 1 mm off (p95 of its seam 0.75 mm, 0.51 with 6 and with 10); lips of known truth are the same with either.
+    """
 
     half_band_mm: float = 6.0
     step_mm: float = 0.2
     overshoot_mm: float = 4.0
     widths_mm: tuple[float, ...] = (0.6, 1.0, 1.6)
-    prior_sigma_mm: float = 3.5
+    prior_sigma_mm: float = 6.0
     bend_weight: float = 0.5
     min_strength_mm: float = 0.04
 
