@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.mesh.closest import interpolate
+from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_normals, vertex_normals
-from facewright.mesh.sampling import on_border, sample_surface
+from facewright.mesh.sampling import on_border
 
-SURFACE_NEARBY_MM = 3.0
+SURFACE_NEARBY_MM, ABOUT_AS_NEAR_MM = 3.0, 0.6
 
 
-def folded_faces(surface, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, count=120000):
+def folded_faces(surface, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM):
     """Indices of faces whose normal is more than 90 degrees from the scan's there.
 
     surface the scan's mesh.closest.Surface; fit (n, 3); faces (m, 3); mask (m,) bool: the faces asked about
     Only where the scan has surface within nearby_mm that is no border. In a crease (lips, lids, alar grooves) the
-    nearest point may lie on the far wall; so a face counts only if no scan point about as near faces its way.
+    nearest point may lie on the far wall; so a face counts only if no face of the scan about as near faces its way.
     """
     asked = np.flatnonzero(mask)
     vertices, scan_faces = surface.vertices, surface.faces
@@ -29,18 +29,15 @@ def folded_faces(surface, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM, coun
     suspects = np.flatnonzero(present & ((normals * there).sum(axis=1) < 0))
     if not len(suspects):
         return asked[suspects]
-    samples = sample_surface(vertices, scan_faces, count, _near_box(vertices, scan_faces, centers[suspects]))
-    sample_normals = face_normals(vertices, scan_faces)[samples.faces]
-    tree = cKDTree(samples.points)
+    corners, scan_normals = vertices[scan_faces], face_normals(vertices, scan_faces)
+    middles = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middles[:, None], axis=2).max()
+    limits = nearest.distance[suspects] + ABOUT_AS_NEAR_MM
+    around = cKDTree(middles).query_ball_point(centers[suspects], limits + reach, return_sorted=True)
     folded = []
-    for suspect in suspects:
-        around = tree.query_ball_point(centers[suspect], nearest.distance[suspect] + 0.6)
-        if not len(around) or (sample_normals[around] @ normals[suspect]).max() < 0:
+    for suspect, limit, near in zip(suspects, limits, around):
+        its_way = np.array(near)[scan_normals[near] @ normals[suspect] > 0]
+        alone = Surface(corners[its_way].reshape(-1, 3), np.arange(3 * len(its_way)).reshape(-1, 3))
+        if not len(its_way) or alone.nearest(centers[suspect][None])[2][0] > limit:
             folded.append(suspect)
     return asked[np.array(folded, np.int64)]
-
-
-def _near_box(vertices, faces, points, margin_mm=5.0):
-    """(m,) bool: faces in the box around points (k, 3)."""
-    centers = vertices[faces].mean(axis=1)
-    return ((centers > points.min(axis=0) - margin_mm) & (centers < points.max(axis=0) + margin_mm)).all(axis=1)

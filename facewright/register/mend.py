@@ -96,20 +96,24 @@ def without_folds(template, skin, faces, surface):
             apart &= cKDTree(vertices[line]).query(middles)[0] > RIMS_MM[start]
         return found[apart]
 
-    best, left = skin, folded(skin, outer)
-    for rings in FLATTENED:
-        if not len(left):
-            break
+    def nearest_shape(best, left):
+        """The first trial with fewer folds and no more crossings, and its folds; None if there is none."""
         knot = np.zeros(n, bool)
         knot[faces[left].ravel()] = True
         around = outer & dilate(knot, faces, max(FLATTENED) + 2)[faces].any(axis=1)
-        free = dilate(knot, faces, rings) & ~_led(template, n)
-        if not free.any():
-            continue
-        tried = reshaped(best, template.vertices[:n], faces, free)
-        remaining = folded(tried, around)
-        if len(remaining) < len(left) and _crossings(tried, faces, around) <= _crossings(best, faces, around):
-            best, left = tried, remaining
+        for rings in FLATTENED:
+            free = dilate(knot, faces, rings) & ~_led(template, n)
+            if not free.any():
+                continue
+            tried = reshaped(best, template.vertices[:n], faces, free)
+            remaining = folded(tried, around)
+            if len(remaining) < len(left) and _crossings(tried, faces, around) <= _crossings(best, faces, around):
+                return tried, remaining
+        return None
+
+    best, left = skin, folded(skin, outer)
+    while len(left) and (found := nearest_shape(best, left)) is not None:
+        best, left = found
     return best
 
 
