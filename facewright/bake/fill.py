@@ -35,6 +35,8 @@ STAIN_MM, STAIN_STEPS, STAIN_SPREADS, STAIN_SHARE = 25.0, 20.0, 3.0, 0.5
 TOLD_APART, HAIR_NEARBY = 3.0, 8
 RIDGE = 1e-6
 FORGET_MM = 30.0
+# The other side is no model for the skin this near to what neither side shows: hair begins there, on each its own way.
+LOST_MM = 10.0
 LUMA = np.array([0.299, 0.587, 0.114])
 # Multiplies the mean skin colour (sRGB): what is found this many mm behind the rim.
 INTERIORS = {
@@ -142,6 +144,8 @@ def solve_fill(V, F, regions, mirror, outer, means, share, default):
     color = np.where(known[:, None], means, skin)
 
     twin_known = known[mirror] & outer
+    nowhere = outer & ~known & ~twin_known
+    twin_known &= surface_distance(V, F, nowhere, LOST_MM) >= LOST_MM
     guide = np.where(twin_known[:, None], means[mirror], 0.0)
     # The skin first, then what lies behind its rims: a dark mouth must not tint a cheek that nobody saw.
     color = _poisson(V, F, color, known, outer & ~known, guide, twin_known, skin)

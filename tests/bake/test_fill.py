@@ -110,3 +110,18 @@ def test_far_from_the_rim_the_fill_is_the_usual_skin(ball):
     rim, far = ~shown & (arc < 0.3 * FORGET_MM), arc > 2.5 * FORGET_MM
     assert fill.color[rim].mean() < 110, "no step at the rim"
     assert np.abs(fill.color[far] - 160).max() < 15
+
+
+def test_what_the_other_side_shows_beside_the_unknown_is_not_repeated(ball):
+    """Hair hides both sides beyond a line, one side a little more: the skin between it and the hair of the other side,
+    which is lit there, is no model."""
+    V, F, mirror, _ = ball
+    outer, side = np.ones(len(V), bool), np.where(V[:, 0] > 0, 1.0, -1.0)
+    missing = V[:, 1] > np.where(side > 0, 12.0, 16.0)
+    lit = (V[:, 0] < -30) & (V[:, 1] > 12.0)
+    colors = np.where(lit, 240.0, 120.0)[:, None] * np.ones(3)
+    fill = solve_fill(V, F, {}, mirror, outer, colors, np.where(missing, 0.0, 1.0), (1, 2, 3))
+    strip = missing & lit[mirror] & ~missing[mirror]
+    assert strip.sum() > 10
+    assert fill.color[strip].max() < 150
+    assert (fill.detail[strip] == 0).all()
