@@ -70,7 +70,8 @@ class _Pairs(NamedTuple):
 def ear_motion(vertices, faces, ears, target, options=None):
     """(n, 3) displacement that brings the ears of a skin to a scan's; none for an ear that fits or that hair hides.
 
-    vertices (n, 3) mm near the scan, faces (m, 3); ears: masks (n,); target: correspond.Target
+    vertices (n, 3) mm near the scan, faces (m, 3); ears: masks (n,); target: correspond.Target. What its colour says is
+    hair is no ear.
     """
     options = options or EarOptions()
     result = np.zeros_like(vertices)
@@ -134,6 +135,7 @@ class _Ear:
         low, high = options.out_mm
         heights = self.height, _height(target.vertices[self.near], head)
         self.own, self.there = (a * np.clip((h - low) / (high - low), 0.0, 1.0) for a, h in zip(area, heights))
+        self.there *= np.clip(1.0 - target.hair[self.near], 0.0, 1.0)
 
     def fitted(self):
         """(A (3, 3), t (3,)) of the ear; None where the scan shows no such ear, or where the ear fits as it is."""
@@ -148,7 +150,8 @@ class _Ear:
             best = self._best_from(best, *self._aside())
         best = self._settled(best, partial(best_affine, like=best[0], hold=options.hold))
         shown = _far_if_unmet(self._matched(best)[2], options).mean() < options.shown_mm
-        nearer = self._own_distance(best) < self._own_distance(stays)
+        # A small ear in hair is met by it all over, but what stands out of the head is far from what stands out there.
+        nearer = self._own_distance(best) < min(self._own_distance(stays), options.shown_mm)
         return best if shown and nearer and self._both_ways(best) < options.better * self._both_ways(stays) else None
 
     def _best_from(self, *starts):

@@ -101,7 +101,7 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
         height = np.einsum("kc,kc->k", normals[sampled], matches.points - vertices[sampled])
         # Heights mean little while the model is still far off.
         height = height if progress > 0.5 else np.zeros_like(height)
-        belief = matches.weights * rules.believe(sampled[:, None], height, matches.roughness)
+        belief = matches.weights * rules.believe(sampled[:, None], height, matches)
         surface = (rows, residuals, information * areas * belief)
         rows, residuals, row_weights = _landmark_rows(state, landmark_model, landmark_points, landmark_weights)
         fading = (1 - progress) ** 2 + options.landmark_floor

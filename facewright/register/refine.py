@@ -67,7 +67,7 @@ def refine_model(model, mean, basis, faces, weights, rules, target, finely=True)
     for _ in range(ROUNDS):
         found = target.match(frame.outward(there), normals, max_distance=REACH_MM, tau=TAU_MM)
         height = np.einsum("kc,kc->k", normals, found.points - frame.outward(there))
-        belief = areas * found.weights * rules.believe(sampled[:, None], height, found.roughness)
+        belief = areas * found.weights * rules.believe(sampled[:, None], height, found)
         seen = np.flatnonzero(belief > 1e-3 * areas)
         directions = frame.turned_inward(found.normals[seen])
         heights = np.einsum("kc,kc->k", directions, frame.inward(found.points[seen]) - rest[seen])

@@ -11,6 +11,7 @@ from facewright.mesh.openness import vertex_openness
 from facewright.register.colors import surface_colors
 from facewright.register.correspond import Target
 from facewright.register.ears import ear_motion, hidden_ears
+from facewright.register.hair import hair_by_color
 from facewright.register.leading import leading_lines
 from facewright.register.lids import open_eyes
 from facewright.register.localize import localized_basis
@@ -71,7 +72,8 @@ def register(scan, landmarks, template, options=None, placed=()):
     options = options or RegisterOptions()
     target = Target(scan.vertices, scan.faces, _openness(scan.vertices, scan.faces))
     smooth = [landmarks.names.index(f"mp{i}") for i in SMOOTH_LANDMARKS]
-    target.compare_roughness(landmarks.positions(scan.vertices, scan.faces)[smooth])
+    skin_points = landmarks.positions(scan.vertices, scan.faces)[smooth]
+    target.tell_skin(skin_points, hair_by_color(scan, skin_points))
     pairs = landmark_pairs(scan, landmarks, template, placed)
     face, outer = template.regions["face"], template.regions["outer"]
     basis = localized_basis(template.vertices, template.identity_basis, face, outer)
@@ -220,5 +222,5 @@ def _ears(template):
 def _hidden(rules, observed):
     """(n,) bool: where hair or cloth may lie and the scan was not believed; there the face follows the model."""
     hidden = np.zeros(len(observed), bool)
-    hidden[: len(rules.hairy)] = rules.hairy & ~observed[: len(rules.hairy)]
+    hidden[: len(rules.hairy)] = (rules.hairy | rules.curtained) & ~observed[: len(rules.hairy)]
     return hidden

@@ -36,8 +36,10 @@ HOLD, HELD_FROM_MM, LEAST_HELD, LOOSE = 3e-3, 15.0, 0.3, 1e-4
 
 @dataclass(frozen=True)
 class SkinRules:
-    """Per skin vertex: trust (n,) 0..1 of data, stiffness (n,), inward and outward reach (n,) mm, hairy (n,) bool.
+    """Per skin vertex: trust (n,) 0..1 of data, stiffness (n,), inward and outward reach (n,) mm.
 
+    hairy (n,) bool: hair may cover it, which relief and colour tell; curtained (n,) bool: hair may hang before it,
+    which only colour tells, for bearded cheeks are as rough
     hold (n,): how much it is held to the model, against data of one per mm2
     """
 
@@ -46,17 +48,19 @@ class SkinRules:
     inward: np.ndarray
     outward: np.ndarray
     hairy: np.ndarray
+    curtained: np.ndarray
     hold: np.ndarray
 
-    def believe(self, rows, height, roughness):
+    def believe(self, rows, height, found):
         """(k,) factor in 0..1 for data at vertices rows (k, c): hair, cloth and holes are not believed.
 
-        height (k,) mm of the scan above the template there, roughness (k,) relative to the scan's skin; with several
+        height (k,) mm of the scan above the template there, found correspond.Matches or Samples of it; with several
         vertices a row (a face's corners) the strictest counts
         """
-        smooth = np.clip((HAIR_RATIO - roughness) / (HAIR_RATIO - SKIN_RATIO), 0.0, 1.0)
+        smooth = np.clip((HAIR_RATIO - found.roughness) / (HAIR_RATIO - SKIN_RATIO), 0.0, 1.0)
         inside = (height <= self.outward[rows].min(axis=1)) & (height >= -self.inward[rows].min(axis=1))
-        return inside * np.where(self.hairy[rows].any(axis=1), smooth, 1.0)
+        hairy, curtained = self.hairy[rows].any(axis=1), (self.hairy | self.curtained)[rows].any(axis=1)
+        return inside * np.where(hairy, smooth, 1.0) * np.where(curtained, np.clip(1.0 - found.hair, 0.0, 1.0), 1.0)
 
 
 def skin_rules(template):
@@ -81,12 +85,13 @@ def skin_rules(template):
     ears = regions["ear_left"] | regions["ear_right"]
     hairy = regions["outer"] & away & (above | ~regions["face"]) & ~ears
     outward[hairy & regions["face"]] = 5.0
+    curtained = regions["face"] & away & ~ears & (vertices[:, 1] > vertices[regions["lips"], 1].mean())
     led, outside = (
         np.minimum(cKDTree(vertices[mask]).query(vertices)[0] / HELD_FROM_MM, 1.0)
         for mask in (regions["eyes"] | regions["lips"], regions["outer"] & ~regions["face"])
     )
     hold = np.maximum(HOLD * np.maximum(led, LEAST_HELD) * outside, LOOSE)
-    return SkinRules(trust, stiffness, inward, outward, hairy, hold)
+    return SkinRules(trust, stiffness, inward, outward, hairy, curtained, hold)
 
 
 def without_hair(rules, template, vertices, target):
@@ -190,7 +195,7 @@ def fit_skin(start, faces, target, rules, leading, levels, samples=20000):
     returns vertices (n, 3) and the Matches of the last level
     """
     skin = ElasticSkin(start, faces, rules.stiffness)
-    points, point_normals, point_roughness = target.samples(samples)
+    seen = target.samples(samples)
     share = skin.mass.sum() / samples
     displacement = np.zeros_like(start)
     n = len(start)
@@ -202,7 +207,7 @@ def fit_skin(start, faces, target, rules, leading, levels, samples=20000):
         matches = _matches(target, vertices, normals, rules, reach, tau)
         rows = [
             Rows(identity, matches.points, matches.weights * skin.mass, matches.normals),
-            _pull_back(vertices, faces, normals, (points, point_normals, point_roughness), rules, reach, tau, share),
+            _pull_back(vertices, faces, normals, seen, rules, reach, tau, share),
             *(row for rule in leading for row in rule(vertices)),
         ]
         displacement = skin.solve(rows, w_bend, w_stretch, rules.hold, start=displacement)
@@ -213,26 +218,25 @@ def _matches(target, vertices, normals, rules, reach, tau):
     found = target.match(vertices, normals, max_distance=reach, tau=tau)
     height = np.einsum("kc,kc->k", normals, found.points - vertices)
     itself = np.arange(len(vertices))[:, None]
-    weights = found.weights * rules.trust * rules.believe(itself, height, found.roughness)
+    weights = found.weights * rules.trust * rules.believe(itself, height, found)
     return replace(found, weights=weights)
 
 
 def _pull_back(vertices, faces, normals, samples, rules, reach, tau, share):
     """Rows from scan samples to the template, so that hollows that no vertex looks into are reached too."""
-    points, point_normals, roughness = samples
-    nearest = Surface(vertices, faces).closest(points)
+    nearest = Surface(vertices, faces).closest(samples.points)
     corners = faces[nearest.faces]
     trust = interpolate(rules.trust, faces, nearest.faces, nearest.barycentric)
     trust = np.where(rules.trust[corners].min(axis=1) > 0, trust, 0.0)
     smooth_normals = interpolate(normals, faces, nearest.faces, nearest.barycentric)
-    height = np.einsum("kc,kc->k", smooth_normals, points - nearest.points)
-    agree = np.einsum("kc,kc->k", smooth_normals, point_normals) > 0.5
+    height = np.einsum("kc,kc->k", smooth_normals, samples.points - nearest.points)
+    agree = np.einsum("kc,kc->k", smooth_normals, samples.normals) > 0.5
     weights = trust * agree * (nearest.distance <= reach)
-    weights *= rules.believe(corners, height, roughness)
+    weights *= rules.believe(corners, height, samples)
     weights = weights * (tau**2 / (tau**2 + nearest.distance**2)) ** 2 * share
     keep = np.flatnonzero(weights > 1e-6)
     rows = np.repeat(np.arange(len(keep)), 3)
     matrix = sp.csr_matrix(
         (nearest.barycentric[keep].ravel(), (rows, corners[keep].ravel())), shape=(len(keep), len(vertices))
     )
-    return Rows(matrix, points[keep], weights[keep], point_normals[keep])
+    return Rows(matrix, samples.points[keep], weights[keep], samples.normals[keep])

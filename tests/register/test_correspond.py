@@ -3,7 +3,8 @@
 import numpy as np
 
 from facewright.mesh.normals import face_normals, vertex_normals
-from facewright.register.correspond import Target
+from facewright.mesh.subdivide import split_in_four, with_midpoints
+from facewright.register.correspond import Target, roughness_deg
 
 
 def bumpy_sheet(edge_mm=1.2, size=60, noise=0.15):
@@ -49,3 +50,19 @@ def test_facets_of_a_coarse_scan_go_and_its_form_stays():
     assert degrees(smooth) < degrees(target)
     assert smooth.roughness.shape == smooth.openness.shape == smooth.border.shape == (len(smooth.vertices),)
     assert not smooth.border[np.linalg.norm(smooth.vertices - smooth.vertices.mean(axis=0), axis=1) < 60].any()
+
+
+def test_a_finer_mesh_of_the_same_surface_is_smoothed_alike():
+    _, noisy, faces, inside = bumpy_sheet(edge_mm=2.0, noise=0.3)
+    edges, finer = split_in_four(faces, len(noisy))
+    coarse = Target(noisy, faces).smoothed(2.0)
+    fine = Target(with_midpoints(noisy, edges), finer).smoothed(1.0)
+    moved = np.abs(coarse.vertices - noisy)[inside].mean()
+    assert np.abs(fine.vertices[: len(noisy)] - coarse.vertices)[inside].mean() < 0.3 * moved
+
+
+def test_roughness_is_of_the_surface_not_of_its_triangles():
+    _, noisy, faces, inside = bumpy_sheet(edge_mm=3.0, noise=0.5)
+    edges, finer = split_in_four(faces, len(noisy))
+    coarse, fine = roughness_deg(noisy, faces), roughness_deg(with_midpoints(noisy, edges), finer)[: len(noisy)]
+    assert np.abs(fine - coarse)[inside].mean() < 0.1 * coarse[inside].mean()

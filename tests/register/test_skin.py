@@ -3,7 +3,7 @@
 import numpy as np
 
 from facewright.mesh.normals import vertex_normals
-from facewright.register.correspond import Target
+from facewright.register.correspond import Samples, Target
 from facewright.register.lids import Border
 from facewright.register.register import LEVELS
 from facewright.register.skin import aside_rows, border_rows, fit_skin, skin_rules
@@ -47,3 +47,20 @@ def test_vertices_are_led_aside_by_what_is_beyond_the_slack_and_never_in_depth()
     assert np.allclose(rows.matrix @ vertices, vertices[[0, 2]])
     assert np.allclose(rows.targets, [[0.0, 1.5, 5.0], [1.0, 1.0, 0.0]])
     assert rows.weights.tolist() == [2.0, 2.0]
+
+
+def test_hair_before_a_cheek_is_told_by_its_colour_and_a_beard_is_not(hm08):
+    rules = skin_rules(hm08)
+    V, face = hm08.vertices[: len(rules.hairy)], hm08.regions["face"][: len(rules.hairy)]
+    cheek = face & rules.curtained & ~rules.hairy
+    chin = face & ~rules.curtained & (V[:, 1] < V[hm08.lines["lip_seam_lower"], 1].min() - 15)
+    assert cheek.sum() > 100 and chin.sum() > 100
+
+    def believed(mask, roughness, hair):
+        rows = np.flatnonzero(mask)[:, None]
+        values = np.full(len(rows), roughness), np.full(len(rows), hair)
+        return rules.believe(rows, np.zeros(len(rows)), Samples(None, None, *values))
+
+    assert (believed(cheek, 5.0, 0.0) == 1).all() and (believed(cheek, 0.5, 1.0) == 0).all()
+    assert (believed(chin, 5.0, 1.0) == 1).all()
+    assert (believed(rules.hairy, 5.0, 0.0) == 0).all() and (believed(rules.hairy, 0.5, 1.0) == 0).all()
