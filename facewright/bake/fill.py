@@ -30,6 +30,8 @@ SHOWN_SHARE = 0.5
 # Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
 # is hair.
 STAIN_MM, STAIN_STEPS, STAIN_SPREADS, STAIN_SHARE = 25.0, 20.0, 3.0, 0.5
+# And on bare skin what is darker than so much of the skin around, continued to there: a hairline's shadow.
+SHADOW_SHARE = 0.88
 # So is what is nearer to the hair's own colour than to the skin's, where the two differ by so many spreads of the skin.
 # On dark skin and in a strong light brightness does not tell them apart.
 TOLD_APART, HAIR_NEARBY = 3.0, 8
@@ -81,11 +83,11 @@ def feather(V, F, outer, share):
     return np.where(outer & ~holes, smooth_step(distance, 1.0, FEATHER_MM), 0.0)
 
 
-def hair_stains(V, F, means, share, hidden, hair):
+def hair_stains(V, F, means, share, hidden, hair, bare):
     """(n,) bool: vertices whose colour is that of the hair beside them: strands, a hairline, what shows between curls.
 
     V (n, 3), F (m, 3) skin; means (n, 3) sRGB and share (n,) as in solve_fill; hidden (n,) bool: hair covers the skin
-    hair (h, 3) sRGB: what covers it, for each hidden vertex
+    hair (h, 3) sRGB: what covers it, for each hidden vertex; bare (n,) bool: where neither brows nor beards grow
     A stain hangs together with skin that is hidden or not shown, so brows and birthmarks stay.
     """
     shown = (share >= SHOWN_SHARE) & ~hidden
@@ -101,6 +103,7 @@ def hair_stains(V, F, means, share, hidden, hair):
     odd[odd] = (np.abs(brightness[odd] - usual) > limit) | _nearer_to_hair(
         means[odd], means[skin], hair[cKDTree(V[hidden]).query(V[odd], min(HAIR_NEARBY, hidden.sum()))[1]]
     )
+    odd |= shown & near & bare & (brightness < SHADOW_SHARE * (_continued(V, F, means, skin, near) @ LUMA))
     passable, reached = odd | (near & ~shown), hidden
     while True:
         grown = hidden | (dilate(reached, F) & passable)
@@ -108,6 +111,13 @@ def hair_stains(V, F, means, share, hidden, hair):
             # Hair ends somewhere on the faces at the edge of a stain.
             return shown & near & dilate(reached & odd, F)
         reached = grown
+
+
+def _continued(V, F, means, skin, near):
+    """(n, 3) sRGB of the skin (n,), continued as a membrane to what is near it (n,); means elsewhere."""
+    # Guided by nothing it forgets nothing: the shaded side of a head stays shaded.
+    everywhere = np.ones(len(V), bool)
+    return _poisson(V, F, means, skin, near, np.zeros_like(means), everywhere, np.median(means[skin], axis=0))
 
 
 def _nearer_to_hair(colors, skin, hair):

@@ -194,15 +194,15 @@ def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
     n = len(skin.V)
     regions = {name: mask[:n] for name, mask in face.regions.items()}
     means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
-    stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin))
+    bare = ~_bearded(skin.neutral, regions)
+    stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin), bare)
 
     def solved():
         known, default = np.where(stains, 0.0, share), _default_skin(face.template)
         return solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, known, default)
 
     fill = solved()
-    beside = surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM
-    beside &= ~_bearded(skin.neutral, regions)
+    beside = bare & (surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM)
     for _ in range(STRAND_ROUNDS):  # what strands have darkened hides others
         strands = colored & _strands(skin, texels, colors, beside, fill, jobs)
         if not strands.any():

@@ -79,12 +79,23 @@ def test_a_lock_at_the_hairline_is_hair_and_a_brow_is_not(ball):
     lock = (np.abs(V[:, 0]) < 12) & (V[:, 1] > 25) & ~hidden
     brow = (np.abs(V[:, 0] - 30) < 12) & (np.abs(V[:, 1] - 20) < 6) & (V[:, 2] > 0)
     means = np.where((hidden | lock | brow)[:, None], 30.0, 150.0) * np.ones(3)
-    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, means[hidden])
+    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, means[hidden], np.ones(len(V), bool))
     assert lock.any() and brow.any()
     assert (stains & ~hidden)[lock].all() and not (stains & brow).any()
     assert not (stains & ~dilate(lock, F)).any(), "and its edge, no more"
     none = np.zeros(len(V), bool)
-    assert not hair_stains(V, F, means, np.ones(len(V)), none, means[none]).any(), "no hair, no stains"
+    assert not hair_stains(V, F, means, np.ones(len(V)), none, means[none], ~none).any(), "no hair, no stains"
+
+
+def test_the_shadow_of_a_hairline_goes_and_the_shade_of_a_head_stays(ball):
+    V, F, _, _ = ball
+    hidden = V[:, 1] > 40
+    light = 150.0 * (0.7 + 0.3 * V[:, 0] / 80.0)
+    shadow = (V[:, 1] > 30) & (V[:, 2] > 30) & ~hidden
+    means = np.where(hidden, 30.0, np.where(shadow, 0.8, 1.0) * light)[:, None] * np.ones(3)
+    bare = V[:, 2] > 0
+    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, means[hidden], bare)
+    assert stains[shadow].all() and not (stains & ~dilate(shadow | hidden, F)).any()
 
 
 def test_hair_as_bright_as_the_shaded_skin_is_told_by_its_hue(ball):
@@ -94,7 +105,7 @@ def test_hair_as_bright_as_the_shaded_skin_is_told_by_its_hue(ball):
     light = (0.75 + 0.25 * V[:, :1] / 80.0) * np.ones(3)
     skin, hair = light * [190.0, 140.0, 120.0], 0.9 * light * [140.0, 110.0, 50.0]
     means = np.where((hidden | lock)[:, None], hair, skin)
-    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, hair[hidden])
+    stains = hair_stains(V, F, means, np.where(hidden, 0.0, 1.0), hidden, hair[hidden], np.ones(len(V), bool))
     assert stains[lock].mean() > 0.95
     assert not (stains & ~dilate(lock, F)).any()
 
