@@ -23,7 +23,7 @@ from facewright.mesh.seam import seam_sides
 
 _REACH_MM, _LINING_MM = 8.0, 3.0  # over the skin and over the lining from the margins: what the other lid may meet
 _GAP_MM, _MARGIN_GAP_MM = 0.03, 0.01  # left between two lids, and beside their margins
-_OVER_MM, _OVER_ENDS_MM = 0.06, 3.0  # by which the upper margin comes before the lower one, so that nobody looks between them
+_OVER_MM, _OVER_ENDS_MM = 0.06, 3.0  # by which the upper margin passes the lower one, that far from the canthi
 _NEAR_MM, _DEEPEST_MM = 0.5, 4.0  # lids nearer than this over a place may come to meet there; deeper is no contact
 _MARGIN_EASE = 0.004  # how readily a margin gives way; the rest: 1
 _LEAST_EASE = 1e-3  # taken of a wish that hardly anything can meet, or it would pull without end
@@ -35,13 +35,12 @@ _FRONT, _NARROW_MM = 0.5, 0.05  # seen from ahead: share of its area from which 
 _STIFF = 0.25  # of a face's edges: one whose area turns change by less is left alone
 _STILL_MM, _LOOSE, _SMOOTH_MM = 1e-3, 0.02, 0.5  # what is not moved itself follows what lies around it
 _HELD = 1e3  # weight of a margin, which does not follow
-_SILL = np.tan(np.radians(45.0))  # by which a sill rises behind the margins,
-_SILL_MM, _SILL_ENDS_MM = 1.0, 4.0  # so far from them; where it ends
-_SILL_MOST_MM = 2.5
-_SILL_SHARE = 0.7  # of the room beneath the other lid's lining that it takes at most
-_SILL_LINING_MM = 6.0  # from the margins: lining that it is made of and that lies over it
-_SILL_LOWER = 0.4, 0.4, 0.5, 1.0, 9.0  # by which it rises less, round by round, where something crosses or folds
-_SILL_ASIDE_MM = 1.0, 0.2  # along the axis from there
+# The sill behind shut margins: how steeply it rises and so far from them; where it ends; by how much it is raised at
+# most, of the room beneath the other lid's lining too; lining that counts as either; by how much less it rises, round
+# by round, where something crosses or folds, and how far along the axis from there that is felt.
+_SILL, _SILL_MM, _SILL_ENDS_MM = 1.0, 1.0, 4.0
+_SILL_MOST_MM, _SILL_SHARE, _SILL_LINING_MM = 2.5, 0.7, 6.0
+_SILL_LOWER, _SILL_ASIDE_MM = (0.4, 0.4, 0.5, 1.0), (1.0, 0.2)
 
 
 class Meeting:
@@ -128,11 +127,14 @@ class Meeting:
         along, radius, angle = self.axes.cylindrical(pose[self._behind])
         at, before, height = self.axes.cylindrical(pose[self._lower])
         depth = np.maximum(along_line(along, at, before) - radius, 0.0)
-        share = smooth_step(depth, _SILL_ENDS_MM, _SILL_MM) * along_line(along, at, from_ends(pose[self._lower]))
+        level = along_line(along, at, height) - angle
+        away = np.hypot(depth, self._far * level)
+        share = smooth_step(away, _SILL_ENDS_MM, _SILL_MM) * along_line(along, at, from_ends(pose[self._lower]))
         most = np.minimum(_SILL_SHARE * self._room(pose, along, radius, angle), _SILL_MOST_MM / self._far)
-        level, slope = along_line(along, at, height) - angle, np.minimum(depth, _SILL_MM) / self._far
-        faulty, steep = self._faulty(pose), _SILL
-        for lower in _SILL_LOWER:
+        slope = np.minimum(depth, _SILL_MM) / self._far
+        faulty, steep, near = self._faulty(pose), _SILL, 0.0
+        for lower in (0.0, *_SILL_LOWER):
+            steep = steep - lower * near
             turns = np.zeros(len(pose))
             turns[self._behind] = np.clip(share * (level + steep * slope), 0.0, most)
             sealed = self.axes.turned(pose, turns)
@@ -140,7 +142,7 @@ class Meeting:
             if not len(new):
                 return sealed
             there = (pose[self._sill_faces[new]] @ self.axes.axis).mean(axis=1) - self.axes.center @ self.axes.axis
-            steep = steep - lower * smooth_step(np.abs(along[:, None] - there).min(axis=1), *_SILL_ASIDE_MM)
+            near = smooth_step(np.abs(along[:, None] - there).min(axis=1), *_SILL_ASIDE_MM)
         return pose
 
     def _room(self, pose, along, radius, angle):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from facewright.evaluate.eyes import eye_poses
@@ -84,7 +86,7 @@ def _roots(vertices, faces, near):
         corners = np.flatnonzero(inner[loop] < np.radians(_CORNER_DEG))
         loop = np.roll(loop, -corners[0]) if len(corners) else loop
         ends = np.append(corners - corners[0], len(loop)) if len(corners) else [0, len(loop)]
-        for start, stop in zip(ends[:-1], ends[1:]):
+        for start, stop in pairwise(ends):
             side = np.append(loop, loop[0])[start : stop + 1]
             if near[side].mean() > _OF_A_SIDE:
                 roots.append(side[near[side]])

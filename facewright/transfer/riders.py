@@ -55,12 +55,16 @@ class LidRiders:
         root, frames = self._frames(template.vertices, ball)
         self._offset = np.einsum("rij,rj->ri", frames, points - root)
         gap = ball.gap(points)
+        stands_off = np.linalg.norm(points - root, axis=1) > _ROOT_MM
         self._clear = np.where(gap > 0, np.minimum(gap, _CLEAR_MM), -np.inf)
-        self._lies = (gap > 0) & (gap < _LIES_MM) & (np.linalg.norm(points - root, axis=1) > _ROOT_MM)
+        self._lies = (gap > 0) & (gap < _LIES_MM) & stands_off
         self._gap = gap
         # What lies between lids and eyeball goes back with it: shut lids would have it before them.
-        between = ~np.concatenate([np.full(len(range(*part.vertices)), part.name.startswith("lashes")) for part in self.parts])
-        self._most = np.where(between & (gap > 0) & (np.linalg.norm(points - root, axis=1) > _ROOT_MM), gap, np.inf)
+        lashes = np.repeat(
+            [part.name.startswith("lashes") for part in self.parts],
+            [part.vertices[1] - part.vertices[0] for part in self.parts],
+        )
+        self._most = np.where(~lashes & stands_off & (gap > 0), gap, np.inf)
         self._rest_radius = ball.radius
 
     def placed(self, vertices, ball):
