@@ -12,6 +12,7 @@ import numpy as np
 
 from facewright.contact import (
     EyeShapes,
+    clear_lids,
     clear_lips,
     even_lining,
     find_jaw,
@@ -49,8 +50,8 @@ def unscanned_face(template, vertices):
 
 
 def in_place(face, irises=None):
-    """A Face with its parts fitted and its lips clear of each other; irises as parts.find_irises gives them."""
-    return clear_lips(part_lips(even_lining(fit_parts(face, irises=irises))))
+    """A Face with its parts fitted, its lips and lids clear of each other; irises as parts.find_irises gives them."""
+    return clear_lips(part_lips(even_lining(clear_lids(fit_parts(face, irises=irises)))))
 
 
 def template_rig(template, jobs=1):

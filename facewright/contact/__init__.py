@@ -4,7 +4,7 @@ from facewright.contact.crossings import part_crossings
 from facewright.contact.eyes import EyeShapeOptions, EyeShapes, solve_eyes
 from facewright.contact.folds import lay_flat
 from facewright.contact.jaw import find_jaw, keep_jaw_within
-from facewright.contact.lining import clear_lips, even_lining
+from facewright.contact.lining import clear_lids, clear_lips, even_lining
 from facewright.contact.mouth import MouthOptions, part_lips, solve_mouth
 from facewright.contact.neck import hold_neck
 from facewright.contact.targets import Targets
@@ -16,6 +16,7 @@ __all__ = [
     "MouthOptions",
     "Targets",
     "TongueOptions",
+    "clear_lids",
     "clear_lips",
     "even_lining",
     "find_jaw",

@@ -30,7 +30,7 @@ _CORNER_MM = 6.0  # around a canthus the field is evened out
 _SETTLINGS = 3
 _ENDS_MM = 4.0  # of the closing line, over which it rises to the canthi
 _FAR_MM = 2.0
-_LAP_MM = 0.06  # by which the upper margin lies before the lower one when they are shut
+_LAP_MM, _LAP_ENDS_MM = 0.12, 6.0  # by which the upper margin lies before the lower one when they are shut
 _WAVES = 2  # of the closing line between the canthi
 _RADIUS_ROUNDS = 8
 _AS_ONE_MM, _ALONE_MM = 2.5, 12.0  # from the closing line: shut lids go as one with another shape, and not at all
@@ -236,18 +236,21 @@ class Lids:
         for line, slide, sign in zip((self.upper, self.lower), self.slides(pose), (0.5, -0.5)):
             along, theta = pose[line] @ self.axis - ball.center @ self.axis + slide, self.angles(pose[line])
             spokes = np.cos(theta)[:, None] * self.axes.forward + np.sin(theta)[:, None] * self.axes.up
-            points = pose[line]
-            for _ in range(_RADIUS_ROUNDS):  # the radius is asked where the point comes to lie
-                radius = self._closed_radius(points, pose[self.canthi], ball) + sign * _LAP_MM * from_ends(self.V[line])
-                radius = np.maximum(radius, np.abs(along) + 1e-3)
+            lap = sign * _LAP_MM * from_ends(self.V[line], _LAP_ENDS_MM)
+            points, radius = pose[line], np.linalg.norm(pose[line] - ball.center, axis=1)
+            for _ in range(_RADIUS_ROUNDS):
+                # The radius is asked where the point comes to lie; near a canthus it would swing to and fro.
+                wanted = self._closed_radius(points, pose[self.canthi], ball) + lap
+                radius = np.maximum(0.5 * (radius + wanted), np.abs(along) + 1e-3)
                 points = ball.center + along[:, None] * self.axis + np.sqrt(radius**2 - along**2)[:, None] * spokes
             moves.append(points - pose[line])
         spread = [self.field(*(move[:, c] for move in moves)) for c in range(3)]
         pose = self.lifted(pose + np.stack(spread, axis=1), ball)
         # Round a corner some rims pass through others when their margins carry them, some when these do not.
-        return self._soundest(
+        joined = self._soundest(
             self.settled(self._met(self._firm(pose, corners)), ball, shut=True) for corners in (True, False)
         )
+        return self._met.sealed(joined)
 
     def _soundest(self, poses):
         """The first of some poses (n, 3) without faults, or that with the fewest: crossings and folded faces."""

@@ -1,4 +1,4 @@
-"""The lining of the lips at rest, which no scan shows: flesh as thick as the template's, and nothing that crosses."""
+"""Lips and lids at rest: lips with a lining, which no scan shows, as thick as the template's; nothing that crosses."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from facewright.contact.teeth import out_of_teeth, rows_of_teeth
 from facewright.mesh.adjacency import within
 from facewright.mesh.seam import inner_sides
 from facewright.mesh.spread import spread_smoothly
+from facewright.transfer.eyeball import carried_eyeball
+from facewright.transfer.riders import SIDES, LidRiders
 
 _LINING_MM = 10.0  # from the lips' line: lining that is made anew
-_REACH_MM = 15.0  # from the lips' line: skin that may cross
+_REACH_MM, _LID_REACH_MM = 15.0, 8.0  # from the lips' line and from the margins of lids: skin that may cross
 _SEEN_MM, _HIDDEN_MM = 0.1, 1.5  # by which skin is moved at most where it crosses
 
 
@@ -42,15 +44,38 @@ def even_lining(face):
 def clear_lips(face):
     """The data.Face in whose neutral no faces around the lips cross that do not in the template."""
     template, skin = face.template, face.template.skin
-    at, faces = skin.vertex_slice, template.faces[skin.face_slice]
-    rest, seams = template.vertices[at], _seams(face)
-    near = cKDTree(rest[np.concatenate(seams)]).query(rest)[0] < _REACH_MM
-    farthest = np.where(face.regions["outer"][at], _SEEN_MM, _HIDDEN_MM)
-    every = np.ones(len(faces), bool)
-    sides = inner_sides(rest, faces, *seams, _REACH_MM)
-    parting = Parting(rest, faces, within(near, faces), every, farthest, sides)
+    rest, faces = template.vertices[skin.vertex_slice], template.faces[skin.face_slice]
     out = partial(out_of_teeth, rows_of_teeth(template, face.vertices), face.vertices)
-    return _moved(face, parting([face.vertices[at]], [1.0], [out]))
+    return _cleared(face, _seams(face), _REACH_MM, inner_sides(rest, faces, *_seams(face), _REACH_MM), out)
+
+
+def clear_lids(face):
+    """The data.Face, its parts in place, in whose neutral no faces around the lids cross that do not in the template.
+
+    At the inner corner of the eye skin and lining lie a few hundredths of a millimetre apart, and identity modes push
+    one through the other; what is the wrong way round at rest has no right way out in any pose.
+    """
+    lids = [face.lines[name] for name in sorted(face.lines) if name.startswith("lid_")]
+    if not lids:
+        return face
+    cleared = _cleared(face, lids, _LID_REACH_MM, (), np.zeros_like)
+    vertices = np.array(cleared.vertices)
+    for side in SIDES:
+        riders = LidRiders(face.template, side)
+        if len(riders.index):
+            vertices[riders.index] = riders.placed(vertices, carried_eyeball(face.template, vertices, side))
+    return replace(cleared, vertices=vertices)
+
+
+def _cleared(face, lines, reach_mm, sides, way_out):
+    """The Face in whose neutral no faces within reach of some lines cross; sides and way_out as Parting takes them."""
+    template, skin = face.template, face.template.skin
+    at, faces = skin.vertex_slice, template.faces[skin.face_slice]
+    rest = template.vertices[at]
+    near = cKDTree(rest[np.concatenate(lines)]).query(rest)[0] < reach_mm
+    farthest = np.where(face.regions["outer"][at], _SEEN_MM, _HIDDEN_MM)
+    parting = Parting(rest, faces, within(near, faces), np.ones(len(faces), bool), farthest, sides)
+    return _moved(face, parting([face.vertices[at]], [1.0], [way_out]))
 
 
 def _seams(face):

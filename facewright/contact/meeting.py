@@ -13,7 +13,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from facewright.contact.rims import from_ends
-from facewright.mesh.adjacency import unique_edges, within
+from facewright.mesh.adjacency import touching, unique_edges, within
+from facewright.mesh.fade import smooth_step
 from facewright.mesh.folds import expected_normals, folded_by_shape
 from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import cross, dot, face_areas, face_corners, face_cross, normalized
@@ -22,7 +23,7 @@ from facewright.mesh.seam import seam_sides
 
 _REACH_MM, _LINING_MM = 8.0, 3.0  # over the skin and over the lining from the margins: what the other lid may meet
 _GAP_MM, _MARGIN_GAP_MM = 0.03, 0.01  # left between two lids, and beside their margins
-_OVER_MM = 0.04  # by which the upper margin comes before the lower one, so that nobody looks between them
+_OVER_MM, _OVER_ENDS_MM = 0.06, 3.0  # by which the upper margin passes the lower one, that far from the canthi
 _NEAR_MM, _DEEPEST_MM = 0.5, 4.0  # lids nearer than this over a place may come to meet there; deeper is no contact
 _MARGIN_EASE = 0.004  # how readily a margin gives way; the rest: 1
 _LEAST_EASE = 1e-3  # taken of a wish that hardly anything can meet, or it would pull without end
@@ -34,6 +35,12 @@ _FRONT, _NARROW_MM = 0.5, 0.05  # seen from ahead: share of its area from which 
 _STIFF = 0.25  # of a face's edges: one whose area turns change by less is left alone
 _STILL_MM, _LOOSE, _SMOOTH_MM = 1e-3, 0.02, 0.5  # what is not moved itself follows what lies around it
 _HELD = 1e3  # weight of a margin, which does not follow
+# The sill behind shut margins: how steeply it rises and so far from them; where it ends; by how much it is raised at
+# most, of the room beneath the other lid's lining too; lining that counts as either; by how much less it rises, round
+# by round, where something crosses or folds, and how far along the axis from there that is felt.
+_SILL, _SILL_MM, _SILL_ENDS_MM = 1.0, 1.0, 4.0
+_SILL_MOST_MM, _SILL_SHARE, _SILL_LINING_MM = 2.5, 0.7, 6.0
+_SILL_LOWER, _SILL_ASIDE_MM = (0.4, 0.4, 0.5, 1.0), (1.0, 0.2)
 
 
 class Meeting:
@@ -50,6 +57,12 @@ class Meeting:
         skin = seam_sides(vertices, faces[outer[faces].all(axis=1)], upper, lower, _REACH_MM)
         self.sides = [side & ~margins for side in skin]
         lining = seam_sides(vertices, faces[(~outer | margins)[faces].all(axis=1)], upper, lower, _LINING_MM)
+        over, behind = seam_sides(vertices, faces[(~outer | margins)[faces].all(axis=1)], upper, lower, _SILL_LINING_MM)
+        self._behind, self._lower = np.flatnonzero(behind & ~margins), np.asarray(lower)
+        over[upper] = True
+        self._over = faces[within(over, faces)]
+        self._sill_faces = faces[touching(over | behind | margins, faces)]
+        self._at_rest = vertices
         patches = []
         for side, behind, line in zip(skin, lining, (upper, lower)):
             mine = side | behind
@@ -72,7 +85,7 @@ class Meeting:
         self._margins = []
         for line, sign in ((upper, 1.0), (lower, -1.0)):
             at, share = np.searchsorted(self._used, line), from_ends(vertices[line])
-            self._margins.append((at, sign, -_OVER_MM * share))
+            self._margins.append((at, sign, -_OVER_MM * from_ends(vertices[line], _OVER_ENDS_MM)))
             self._ease[at], self._gap[at] = _MARGIN_EASE, _MARGIN_GAP_MM * share
         self._ease[np.intersect1d(*(at for at, *_ in self._margins))] = 0.0
         self._laplacian = _laplacian(self._rest, self._faces)
@@ -105,6 +118,42 @@ class Meeting:
         turns[self._used] = motion / self._far
         return self.axes.turned(pose, turns)
 
+    def sealed(self, pose):
+        """The pose (n, 3) of shut lids with a sill of the lower lid's lining behind the margins, if nothing crosses it.
+
+        Two margins that touch leave a slit as wide as what is kept between them, and where the rims before them run
+        level somebody looks through it. The lining, which nobody sees, rises behind it.
+        """
+        along, radius, angle = self.axes.cylindrical(pose[self._behind])
+        at, before, height = self.axes.cylindrical(pose[self._lower])
+        depth = np.maximum(along_line(along, at, before) - radius, 0.0)
+        level = along_line(along, at, height) - angle
+        away = np.hypot(depth, self._far * level)
+        share = smooth_step(away, _SILL_ENDS_MM, _SILL_MM) * along_line(along, at, from_ends(pose[self._lower]))
+        most = np.minimum(_SILL_SHARE * self._room(pose, along, radius, angle), _SILL_MOST_MM / self._far)
+        slope = np.minimum(depth, _SILL_MM) / self._far
+        faulty, steep, near = self._faulty(pose), _SILL, 0.0
+        for lower in (0.0, *_SILL_LOWER):
+            steep = steep - lower * near
+            turns = np.zeros(len(pose))
+            turns[self._behind] = np.clip(share * (level + steep * slope), 0.0, most)
+            sealed = self.axes.turned(pose, turns)
+            new = np.setdiff1d(self._faulty(sealed), faulty)
+            if not len(new):
+                return sealed
+            there = (pose[self._sill_faces[new]] @ self.axes.axis).mean(axis=1) - self.axes.center @ self.axes.axis
+            near = smooth_step(np.abs(along[:, None] - there).min(axis=1), *_SILL_ASIDE_MM)
+        return pose
+
+    def _room(self, pose, along, radius, angle):
+        """(k,) radians from places behind the lower margin up to the upper lid's lining; no end under nothing."""
+        over, away, height = self.axes.cylindrical(pose)
+        points = np.broadcast_to(np.stack([along, radius], axis=1), (len(self._over), len(along), 2))
+        share = barycentric(np.stack([over, away], axis=1)[self._over], points)
+        room = np.einsum("fkc,fc->fk", share, height[self._over]) - angle
+        room[(share.min(axis=2) < 0.0) | (room < 0.0)] = np.inf
+        return room.min(axis=0, initial=np.inf)
+
     def faults(self, pose):
         """Number of pairs of faces that cross in a pose (n, 3) and not at rest, and of folded faces."""
         if self._before is None:
@@ -112,6 +161,12 @@ class Meeting:
         points = pose[self._used]
         crossing = np.setdiff1d(self._crossing(points), self._before)
         return len(crossing) + _FOLD * len(folded_by_shape(self._rest, points, self._faces))
+
+    def _faulty(self, pose):
+        """Indices of the faces around the lining that cross others, or are folded, in a pose (n, 3)."""
+        pairs = self_intersections(pose, self._sill_faces)
+        folded = folded_by_shape(self._at_rest, pose, self._sill_faces)
+        return np.unique(np.append(pairs.ravel(), folded))
 
     def _crossing(self, points):
         pairs = self_intersections(points, self._faces)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from facewright.evaluate.eyes import eye_poses
 from facewright.evaluate.play import Player
 from facewright.evaluate.rows import Row
 from facewright.evaluate.shapes import shape_names
-from facewright.mesh.adjacency import border_edges
+from facewright.mesh.adjacency import border_loops
 from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.normals import face_corners, normalized
 
-ROOT_MM = 0.05  # edges of cards whose ends are this near to the skin at rest are roots; a tip may touch it too
+ROOT_MM = 0.05  # from the skin at rest
+_OF_A_SIDE = 2 / 3  # of a card's side that lies on the skin from which on it is the one that lashes grow from
+_CORNER_DEG = 140.0  # of a card at its border: less is a corner of it
 LASH_BAR_MM = 0.2
 STEPS = (0.25, 0.5, 0.75, 1.0)
 
@@ -52,9 +57,7 @@ class _Lashes:
     def __init__(self, rig, mesh):
         self.rig, self.mesh, self.skin = rig, mesh, rig.meshes[0]
         found = Surface(self.skin.vertices, self.skin.faces).closest(mesh.vertices)
-        near = found.distance <= ROOT_MM
-        edges = border_edges(mesh.faces)
-        self.roots = np.unique(edges[near[edges].all(axis=1)])
+        self.roots = _roots(mesh.vertices, mesh.faces, found.distance <= ROOT_MM)
         self.faces, self.barycentric = found.faces[self.roots], found.barycentric[self.roots]
 
     def off_mm(self, weights):
@@ -70,3 +73,31 @@ class _Lashes:
 
     def _on(self, values):
         return interpolate(values, self.skin.faces, self.faces, self.barycentric)
+
+
+def _roots(vertices, faces, near):
+    """Indices of the vertices of cards that stand on the skin; near (n,) bool: on it at rest.
+
+    Lashes grow from one side of their card. A corner of it that hangs into the skin, as at the inner corner of an eye,
+    lies there by chance and goes with its lash.
+    """
+    inner, roots = _inner_angles(vertices, faces), []
+    for loop in border_loops(faces):
+        corners = np.flatnonzero(inner[loop] < np.radians(_CORNER_DEG))
+        loop = np.roll(loop, -corners[0]) if len(corners) else loop
+        ends = np.append(corners - corners[0], len(loop)) if len(corners) else [0, len(loop)]
+        for start, stop in pairwise(ends):
+            side = np.append(loop, loop[0])[start : stop + 1]
+            if near[side].mean() > _OF_A_SIDE:
+                roots.append(side[near[side]])
+    return np.unique(np.concatenate(roots)) if roots else np.empty(0, int)
+
+
+def _inner_angles(vertices, faces):
+    """(n,) radians that the faces at each vertex take up there."""
+    total, corners = np.zeros(len(vertices)), face_corners(vertices, faces)
+    for i in range(3):
+        a, b, c = (corners[(i + k) % 3] for k in range(3))
+        cosine = (normalized(b - a) * normalized(c - a)).sum(axis=1)
+        np.add.at(total, faces[:, i], np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return total

@@ -55,16 +55,23 @@ class LidRiders:
         root, frames = self._frames(template.vertices, ball)
         self._offset = np.einsum("rij,rj->ri", frames, points - root)
         gap = ball.gap(points)
+        stands_off = np.linalg.norm(points - root, axis=1) > _ROOT_MM
         self._clear = np.where(gap > 0, np.minimum(gap, _CLEAR_MM), -np.inf)
-        self._lies = (gap > 0) & (gap < _LIES_MM) & (np.linalg.norm(points - root, axis=1) > _ROOT_MM)
+        self._lies = (gap > 0) & (gap < _LIES_MM) & stands_off
         self._gap = gap
+        # What lies between lids and eyeball goes back with it: shut lids would have it before them.
+        lashes = np.repeat(
+            [part.name.startswith("lashes") for part in self.parts],
+            [part.vertices[1] - part.vertices[0] for part in self.parts],
+        )
+        self._most = np.where(~lashes & stands_off & (gap > 0), gap, np.inf)
         self._rest_radius = ball.radius
 
     def placed(self, vertices, ball):
         """(r, 3) the riders on a head (n, 3) with an Eyeball."""
         root, frames = self._frames(vertices, ball)
         points = root + np.einsum("rij,ri->rj", frames, self._offset) * (ball.radius / self._rest_radius)
-        gap = np.where(self._lies, self._gap, np.maximum(ball.gap(points), self._clear))
+        gap = np.where(self._lies, self._gap, np.clip(ball.gap(points), self._clear, self._most))
         held = gap != ball.gap(points)
         points[held] = ball.pushed_to(points[held], gap[held])
         return points

@@ -1,4 +1,4 @@
-"""The lining of the lips is made anew between what is known, and no lip of the neutral passes through another."""
+"""The lining of the lips is made anew between what is known, and in the neutral neither lips nor lids cross."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from facewright.contact import clear_lips, even_lining
+from facewright.contact import clear_lids, clear_lips, even_lining
 from facewright.evaluate.synthetic import random_identity
 from facewright.mesh.intersect import self_intersections
 from facewright.rigging import unscanned_face
@@ -74,3 +74,28 @@ def test_lips_of_the_neutral_do_not_cross(hm08, person):
     change = np.linalg.norm(clear.vertices - even.vertices, axis=1)
     assert change[at][person.regions["outer"][at]].max() < 0.1 + 1e-9
     assert not change[at][from_seam(person) > 15.0].any()
+
+
+def test_lining_pushed_through_the_skin_at_the_corner_of_an_eye_goes_in_again(hm08, own):
+    at, faces = hm08.skin.vertex_slice, hm08.faces[hm08.skin.face_slice]
+    upper, lower = own.lines["lid_upper_left"], own.lines["lid_lower_left"]
+    canthi = own.vertices[np.intersect1d(upper, lower)]
+    away = cKDTree(canthi).query(own.vertices)[0]
+    lining = own.regions["socket_left"] & (away < 1.5)
+    lining[np.concatenate([upper, lower])] = False
+    pushed = np.array(own.vertices)
+    pushed[lining] += [0.0, 0.0, 0.8]
+    face = replace(own, vertices=pushed)
+
+    def crossing(head):
+        return len(self_intersections(head.vertices[at], faces, (away[at] < 6.0)[faces].all(axis=1)))
+
+    cleared = clear_lids(face)
+    assert crossing(face) > 0 and crossing(cleared) == 0
+    moved = np.abs(cleared.vertices - face.vertices)[at]
+    assert moved[own.regions["outer"][at]].max() <= 0.1 + 1e-9
+    assert not moved[away[at] > 15.0].any()
+
+
+def test_lids_that_do_not_cross_stay(own):
+    assert np.allclose(clear_lids(own).vertices, own.vertices, atol=1e-9)

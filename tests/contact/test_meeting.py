@@ -1,5 +1,7 @@
 """Shut lids lie on each other without crossing."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,29 @@ def test_faults_are_new_crossings_and_folds(shut):
     V, faces, _, meeting, pose, _ = shut
     assert meeting.faults(V) == meeting.faults(meeting(pose)) == 0
     assert meeting.faults(pose) >= len(self_intersections(pose, faces)) > 50
+
+
+def test_a_sill_is_made_of_the_lower_lining_alone_and_shuts_out_who_looks_between_the_margins():
+    V, faces, (upper, lower) = eye(1.0, 0.0)
+    margins = np.arctan2(V[np.stack([upper, lower]), 1], V[np.stack([upper, lower]), 2])
+    depth, n = np.array([0.4, 0.8, 1.6, 3.2, 6.4]), len(V)
+    rows = [np.stack([upper, lower])]
+    for d in depth:  # away from each other by half of what they go in
+        angle = margins + np.array([1.0, -1.0])[:, None] * 0.5 * d / FAR
+        points = [np.full((2, len(upper)), V[upper, 0]), (FAR - d) * np.sin(angle), (FAR - d) * np.cos(angle)]
+        V = np.concatenate([V, np.stack(np.broadcast_arrays(*points), axis=-1).reshape(-1, 3)])
+        rows.append(np.arange(len(V) - 2 * len(upper), len(V)).reshape(2, -1))
+    for one, other in pairwise(rows):
+        for lid, turn in ((0, 1), (1, -1)):
+            a, b, c, d = one[lid, :-1], one[lid, 1:], other[lid, 1:], other[lid, :-1]
+            faces = np.concatenate([faces, np.stack([b, a, d], 1)[:, ::turn], np.stack([b, d, c], 1)[:, ::turn]])
+    axes = EyeAxes.of(V[upper], V[lower], np.zeros(3))
+    meeting = Meeting(V, faces, np.arange(len(V)) < n, upper, lower, axes)
+    sealed = meeting.sealed(V)
+    moved = np.flatnonzero(np.linalg.norm(sealed - V, axis=1) > 1e-6)
+    below = np.concatenate([row[1] for row in rows[1:]])
+    assert len(moved) and np.isin(moved, below).all()
+    assert len(self_intersections(sealed, faces)) <= len(self_intersections(V, faces))
+    assert not len(folded_by_shape(V, sealed, faces))
+    middle = len(upper) // 2
+    assert V[rows[2][1, middle], 1] < -0.3 and sealed[rows[2][1, middle], 1] > 0.1

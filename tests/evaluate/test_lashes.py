@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facewright.evaluate.lashes import LASH_BAR_MM, measure_lashes
+from facewright.evaluate.lashes import LASH_BAR_MM, _roots, measure_lashes
 from facewright.parts import build_rig
 
 
@@ -31,3 +31,20 @@ def test_lashes_left_behind_are_found_out(rig):
 def test_a_rig_without_lashes_has_no_figure(rig):
     bald = tuple(mesh for mesh in rig.meshes if not mesh.name.startswith("lashes"))
     assert measure_lashes(replace(rig, meshes=bald)) is None
+
+
+def test_roots_are_one_side_of_a_card_however_its_corner_hangs_into_the_skin():
+    rows, columns = 4, 10
+    y, x = np.mgrid[0.0:rows, 0.0:columns]
+    card = np.stack([x, y, 0.1 * x**2 / columns + 0.2 * y**2], axis=-1).reshape(-1, 3)
+    at = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]
+    faces = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
+    near = np.zeros(rows * columns, bool)
+    near[at[0]] = True
+    assert np.array_equal(_roots(card, faces, near), at[0])
+    near[at[1, 0]] = True
+    assert np.array_equal(_roots(card, faces, near), at[0])
+    near[at[0, 4]] = False
+    assert np.array_equal(_roots(card, faces, near), np.delete(at[0], 4))
+    assert not len(_roots(card, faces, np.zeros(rows * columns, bool)))

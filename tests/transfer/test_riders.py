@@ -77,3 +77,14 @@ def test_on_a_person_lashes_stand_on_the_skin(hm08, hm08_person):
     np.testing.assert_allclose(face.vertices[riders.index], riders.placed(face.vertices, ball), atol=1e-9)
     lids = [part.name for part in lid_parts(hm08, "left")]
     assert {"lashes_left", "caruncle_left", "lacrimal_left", "occlusion_left", "blend_left"} == set(lids)
+
+
+def test_what_lies_between_lids_and_eyeball_goes_back_with_it(hm08, riders):
+    ball = measure_eyeball(hm08, "left")
+    back = replace(ball, center=ball.center - [0.0, 0.0, 3.0])
+    before, after = (riders.placed(hm08.vertices, each) for each in (ball, back))
+    lashes = np.isin(riders.index, np.concatenate([np.arange(*p.vertices) for p in hm08.parts if "lashes" in p.name]))
+    between = ~lashes & (np.linalg.norm(after - before, axis=1) > 1.0)
+    assert between.sum() > 10
+    assert (back.gap(after) <= ball.gap(before) + 1e-6)[between].all()
+    assert (back.gap(after) > ball.gap(before) + 1.0)[lashes].all()
