@@ -129,7 +129,8 @@ class _Crossings:
         def field(names):
             drivers = {driver for name in names for driver in targets.correctives[name]}
             pose = dict.fromkeys(sorted(drivers), 1.0)
-            return self._apart([targets.motion(pose)], [1.0], left=[self.before.motion(pose)])
+            left = [self.before.motion(pose)] if set(names) <= set(self.before.correctives) else ()
+            return self._apart([targets.motion(pose)], [1.0], left=left)
 
         asked = [(names, window) for names, window in pairs if names]
         for (names, window), change in zip(asked, run(field, [names for names, _ in asked])):
