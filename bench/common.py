@@ -63,7 +63,7 @@ def read_json(name):
 def print_table(title, header, rows):
     """A plain text table; numbers with two decimals, None as a dash."""
     cells = [[_cell(value) for value in row] for row in rows]
-    widths = [max(len(str(head)), *(len(row[i]) for row in cells)) for i, head in enumerate(header)]
+    widths = [max(len(row[i]) for row in (tuple(map(str, header)), *cells)) for i in range(len(header))]
     print(f"\n{title}")
     for row in [[str(head) for head in header], *cells]:
         print(

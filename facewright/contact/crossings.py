@@ -23,6 +23,7 @@ _REACH_MM = {"lip_seam": 25.0, "lid_": 10.0, "nostril": 14.0}  # from these line
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
 _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
 _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
+_ON_WAY = 0.25, 0.5, 0.75  # weights of shapes with in-betweens at which a correction must not enter the teeth either
 
 
 def part_crossings(face, targets, jobs=1, pairs=None):
@@ -44,7 +45,7 @@ class _Crossings:
 
     def __init__(self, face, targets):
         template = face.template
-        self.at = template.skin.vertex_slice
+        self.at, self.before = template.skin.vertex_slice, targets
         self.rest, self.teeth = face.vertices, rows_of_teeth(template, face.vertices)
         self.V, faces = face.vertices[self.at], template.faces[template.skin.face_slice]
         asked = face.regions["face"][self.at][faces].all(axis=1)
@@ -69,15 +70,17 @@ class _Crossings:
         self.left = left_share(template)[self.at, None]
         self.is_left = (template.vertices[self.at, 0] > 0.0)[:, None]
 
-    def _apart(self, motions, acts, clean=0):
-        """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say; so many of them,
-        the last ones, have been made clean already."""
+    def _apart(self, motions, acts, left=(), **known):
+        """(k, 3) correction of the skin for motions (n, 3) of the head in which it acts as acts say; known: clean
+        and on_way as Parting takes them, left: motions as contact has left them."""
         heads = [self.rest + motion for motion in motions]
         far = max(np.abs(motion[self.at]).max(initial=0.0) for motion in motions) > _FAR_MM
         ways_out = [partial(out_of_teeth, self.teeth, head) for head in heads]
+        left = [(self.rest + motion)[self.at] for motion in left]
         # Outer skin that a shape leaves alone lies outside its region.
         still = self.outer & ~np.any([differing(motion[self.at], 0.0) for motion in motions], axis=0)
-        return (self.wide if far else self.near)([head[self.at] for head in heads], acts, ways_out, still, clean)
+        parting = self.wide if far else self.near
+        return parting([head[self.at] for head in heads], acts, ways_out, still, left=left, **known)
 
     def with_shapes(self, targets, run):
         """Targets whose shapes have no crossings, nor the halves of those that have any."""
@@ -88,7 +91,10 @@ class _Crossings:
             if base in targets.names:
                 return self._apart([motion + targets.delta(base)], [1.0])
             shares = [1.0, self.left, 1.0 - self.left] if name in self.halves else [1.0]
-            return self._apart([_shared(motion, share, self.at) for share in shares], shares)
+            on_way = _ON_WAY if name in targets.in_betweens else ()
+            way = [targets.motion({name: weight}) for weight in on_way]
+            motions = [_shared(motion, share, self.at) for share in shares]
+            return self._apart([*motions, *way], [*shares, *on_way], on_way=len(way))
 
         def fields(names):
             """Of a left and a right shape: the two, each by itself first, then what both together need."""
@@ -122,7 +128,9 @@ class _Crossings:
 
         def field(names):
             drivers = {driver for name in names for driver in targets.correctives[name]}
-            return self._apart([targets.motion(dict.fromkeys(sorted(drivers), 1.0))], [1.0])
+            pose = dict.fromkeys(sorted(drivers), 1.0)
+            left = [self.before.motion(pose)] if set(names) <= set(self.before.correctives) else ()
+            return self._apart([targets.motion(pose)], [1.0], left=left)
 
         asked = [(names, window) for names, window in pairs if names]
         for (names, window), change in zip(asked, run(field, [names for names, _ in asked])):

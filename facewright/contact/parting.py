@@ -88,18 +88,25 @@ class Parting:
         outside = self.rest + self.options.aside_mm * vertex_normals(self.rest, self.faces)
         self._beyond = -np.asarray(igl.fast_winding_number(self.rest, self.faces, outside)).reshape(-1)
 
-    def __call__(self, poses, acts, ways_out, still=None, clean=0):
+    def __call__(self, poses, acts, ways_out, still=None, clean=0, on_way=0, left=()):
         """(n, 3) correction of a shape after which none of its poses has new crossings, or as few as could be.
 
         poses  sequence of (n, 3); acts: how strongly the correction acts in each, a number or (n, 1)
         ways_out  for each a function of points (k, 3): their ways (k, 3) out of what skin must not enter
         still  (n,) bool: vertices that stay where they are
         clean  how many poses, the last ones, are known to have none: they are asked about where the correction acts
+        on_way how many poses, the last ones, lie on the way to others: there only solids count
+        left   the poses as contact has left them, where corrections have been made since that may have taken skin into
+               solids when they came together; default: the poses
         """
         farthest = self._farthest if still is None else np.where(still[self.used, None], 0.0, self._farthest)
         field = np.zeros_like(self.rest)
         asked = zip(poses, acts, ways_out)
         poses = [_Pose(pose[self.used], self._cut(act), way_out) for pose, act, way_out in asked]
+        for pose, first in zip(poses, left):
+            pose.left = first[self.used]
+        for pose in poses[len(poses) - on_way :]:
+            pose.on_way = True
         for pose in poses[len(poses) - clean :]:
             pose.looked = pose.skin(field)
         field, faults = self._parted(poses, field, farthest, self.options.patience)
@@ -128,15 +135,14 @@ class Parting:
         return best, fewest
 
     def _faults(self, poses, field):
-        """Crossings of poses; where there have been any, folded faces and what the correction takes into solids too."""
+        """Crossings of poses, what corrections take into solids and, where faces have crossed, folded ones too."""
         left = sum(self._look(pose, field) for pose in poses)
-        met = [pose for pose in poses if len(pose.met)]
-        return left + sum(_FOLD * self._folds(pose, field) + self._deep(pose, field) for pose in met)
+        folds = sum(self._folds(pose, field) for pose in poses if len(pose.met))
+        return left + _FOLD * folds + sum(self._deep(pose, field) for pose in poses)
 
     def _deep(self, pose, field):
-        """Number of vertices that the correction moves and that lie deep in what they must not enter."""
-        moved = np.flatnonzero(differing(field, 0.0))
-        return int((lengths(pose.way_out(pose.skin(field)[moved])) > _DEEP_MM).sum()) if len(moved) else 0
+        """Number of vertices that corrections take deep into what they must not enter."""
+        return int((lengths(pose.way_back(field)[1]) > _DEEP_MM).sum())
 
     def _eased(self, poses, field, farthest, width):
         """(k, 3) a field with that share of smoother motion around the crossings that leaves the fewest faults.
@@ -173,6 +179,8 @@ class Parting:
 
     def _look(self, pose, field):
         """Number of new crossings of a pose; those found are remembered with their sense."""
+        if pose.on_way:
+            return 0
         now = pose.skin(field)
         if pose.looked is None:
             stirred = max_norms(now - self.rest) > _STILL_MM
@@ -209,11 +217,10 @@ class Parting:
         return (flat - now) / np.maximum(pose.act, self.options.least_act)
 
     def _out(self, pose, field):
-        """(k, 3) what takes vertices of a pose that the correction moves out of what they must not enter."""
-        moved = np.flatnonzero(differing(field, 0.0)) if len(pose.met) else []
+        """(k, 3) what takes vertices of a pose back that corrections take into what they must not enter."""
+        moved, back = pose.way_back(field)
         way = np.zeros_like(field)
-        if len(moved):
-            way[moved] = pose.way_out(pose.skin(field)[moved])
+        way[moved] = back
         return way / np.maximum(pose.act, self.options.least_act)
 
     def _ways_apart(self, now, pose):
@@ -333,12 +340,27 @@ def _within(field, farthest):
 
 
 class _Pose:
-    """What is known of one pose: crossings now, and all pairs met with their senses."""
+    """What is known of one pose: crossings now, all pairs met with their senses, and how deep skin lay in solids."""
 
     def __init__(self, vertices, act, way_out):
-        self._vertices, self.act, self.way_out = vertices, act, way_out
+        self._vertices, self.act, self._way_out = vertices, act, way_out
+        self.left, self.on_way = vertices, False
         self.looked, self.pairs, self.met = None, np.empty((0, 2), np.int64), np.empty((0, 2), np.int64)
-        self.senses = np.empty(0)
+        self.senses, self._depth = np.empty(0), np.full(len(vertices), np.nan)
 
     def skin(self, field):
         return self._vertices + self.act * field
+
+    def way_back(self, field):
+        """Vertices (m,) that corrections move, and ways (m, 3) by which they lie deeper in solids than contact left
+        them."""
+        now = self.skin(field)
+        moved = np.flatnonzero(differing(now, self.left))
+        if not len(moved):
+            return moved, np.zeros((0, 3))
+        fresh = moved[np.isnan(self._depth[moved])]
+        if len(fresh):
+            self._depth[fresh] = lengths(self._way_out(self.left[fresh]))
+        way = self._way_out(now[moved])
+        depth = lengths(way)
+        return moved, way * (np.maximum(depth - self._depth[moved], 0.0) / np.maximum(depth, 1e-12))[:, None]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
 from facewright.data import Material, Mesh, Rig
 from facewright.parts.fit import fit_skeleton
 from facewright.parts.iris import EyeLook, paint_eye
-from facewright.parts.paint import PAINTERS
+from facewright.parts.mouth_light import mouth_light, parts_behind_lips, shaded
+from facewright.parts.paint import PAINTERS, plain_map
 from facewright.transfer.eyeball import measure_eyeball
 from facewright.transfer.halves import split_in_halves
 from facewright.working_set import read_working_set
@@ -54,11 +56,12 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     targets |= made
     deltas = np.stack(list(targets.values()))
     used = {name: np.asarray(maps[name]) for name in SKIN_MAPS if name in maps}
+    light = cache(lambda: mouth_light(template))
     meshes = []
     for part in template.parts:
         if part.attach == "skin" and part.name.startswith(options.left_out):
             continue
-        material, painted = _material(template, part, used, options)
+        material, painted = _material(template, part, used, options, light)
         used.update(painted)
         meshes.append(_mesh(face, deltas, part, material))
     n_skin = template.skin.vertices[1]
@@ -138,8 +141,8 @@ def _as_seen(look, iris_color, light):
     return replace(look, iris_color=color, sclera_color=white)
 
 
-def _material(template, part, maps, options):
-    """The Material of a part and the maps painted for it."""
+def _material(template, part, maps, options, light):
+    """The Material of a part and the maps painted for it; light() (n,) of mouth_light."""
     look = template.materials[part.material]
     plain = {
         "color": tuple(float(c) for c in look.get("color", (0.8, 0.8, 0.8))),
@@ -157,9 +160,13 @@ def _material(template, part, maps, options):
         # Through the pupil of a separate iris its own back is seen, from within.
         plain |= {"color": (1.0, 1.0, 1.0), "double_sided": part.name != part.attach}
         return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
-    if "paint" in look and options.painted:
+    behind = [other for other in parts_behind_lips(template) if other.material == part.material]
+    if options.painted and ("paint" in look or part in behind):
         name = f"{part.material}_albedo"
-        painted = {} if name in maps else {name: PAINTERS[look["paint"]](look)}
+        painted = {}
+        if name not in maps:
+            image = PAINTERS[look["paint"]](look) if "paint" in look else plain_map(plain["color"])
+            painted[name] = shaded(image, template, behind, light()) if part in behind else image
         return Material(part.material, **plain | {"color": (1.0, 1.0, 1.0)}, albedo=name), painted
     return Material(part.material, **plain), {}
 

@@ -1,7 +1,7 @@
 """Small textures of the mouth's parts, painted in the part's own UVs: what a material asks for by `paint`.
 
 Nothing here knows a template: docs/template.md says how a part's UVs must run for each kind of paint. Colours are sRGB
-as one sees them; the shade that a mouth throws on its own depth is painted in, since few viewers cast it.
+as one sees them, in full light: the shade of the mouth comes on top (mouth_light).
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from facewright.mesh.render import linear_to_srgb
 from facewright.parts.paint_lids import paint_blend, paint_lashes, paint_occlusion
 
 _IVORY, _NECK, _EDGE = (0.905, 0.865, 0.785), (0.84, 0.75, 0.62), (0.85, 0.845, 0.82)
@@ -41,16 +42,18 @@ def paint_teeth(look, size=1024):
     grooves = _step(0.80, 0.97, down) * (1 - front)
     color = color * (1 - 0.22 * grooves)[..., None]
     color = color * (1 - 0.35 * _step(0.26, 0.10, t))[..., None]  # the gum's shade
-    inner = _step(0.2, 0.36, np.abs(u - 0.5))  # the sides and what faces the tongue
-    shade = (1 - 0.085 * np.maximum(column - 1, 0)) * (1 - 0.25 * inner) * (1 - 0.06 * (row > 1))
-    # Light that has come so deep has met red skin before.
-    return _image(color * shade[..., None] ** [0.88, 1.06, 1.14])
+    return _image(color)
+
+
+def plain_map(color, size=512):
+    """(size, size, 3) uint8 sRGB of one linear colour."""
+    return _image(np.broadcast_to(linear_to_srgb(np.asarray(color)), (size, size, 3)))
 
 
 def paint_gums(look, size=512):
     """(size, size, 3) uint8 sRGB: u along the arch, v from 1 at the fold under the lip to 0.55 at the outer and 0.3 at
     the inner margin, to 0 at the palate or the floor of the mouth."""
-    u, v = _grid(size)
+    _, v = _grid(size)
     color = _mix(_GUM, _FOLD, _step(0.82, 0.98, v)[..., None])
     margin = np.exp(-(((v - 0.62) / 0.06) ** 2))[..., None]
     color = _mix(color, _MARGIN, 0.6 * margin)
@@ -58,9 +61,7 @@ def paint_gums(look, size=512):
     vessels = np.abs(_noise(size, (10, 3), 6))
     color = color * (1 + stipple)[..., None]
     color = color * (1 - 0.10 * (np.exp(-((vessels / 0.12) ** 2)) * _step(0.75, 0.95, v))[..., None] * [0.3, 1, 1])
-    back = np.abs(u - 0.5) * 2
-    shade = (1 - 0.55 * _step(0.3, 0.95, back)) * (1 - 0.62 * _step(0.5, 0.15, v))
-    return _image(color * shade[..., None])
+    return _image(color)
 
 
 def paint_tongue(look, size=512):
@@ -78,8 +79,7 @@ def paint_tongue(look, size=512):
     color = color * (1 - 0.16 * groove)[..., None]
     veins = np.exp(-(((side - 0.86) / 0.03) ** 2)) * _step(0.4, 0.7, v)
     color = _mix(color, (0.45, 0.26, 0.36), 0.4 * veins[..., None])
-    shade = 1 - 0.72 * _step(0.62, 0.05, v)
-    return _image(color * shade[..., None])
+    return _image(color)
 
 
 PAINTERS = {

@@ -10,11 +10,13 @@ import numpy as np
 from facewright.evaluate.play import Player
 from facewright.mesh.adjacency import differing, dilate
 from facewright.mesh.scene import CLAY_LINEAR, Drawable, Scene
+from facewright.mesh.winding import winding_numbers
 from facewright.write.sheet import PANEL
 
 BACKGROUND = tuple(c / 255.0 for c in PANEL)
 INNER_SHADE = 0.45
-MOUTH_LIGHT_MM = 18.0  # behind the lips, where half of the light is left
+LEAST_LIGHT = 0.15  # behind shut lips
+ALL_SEEN = 0.45  # share of half a sphere that the mouth's opening takes where all of the light comes in
 BEHIND_LIPS = ("teeth_", "gums_", "tongue")
 CLAY_MAP_PX = 256
 
@@ -119,25 +121,38 @@ def rig_drawables(rig, textured):
 
 
 def mouth_shades(rig, vertices):
-    """A share of the light (n,), or None for all of it, for each mesh that clay shows: less light comes deep into a
-    mouth. vertices: the posed (n, 3) of shown_meshes, the skin first.
+    """A share of the light (n,), or None for all of it, for each mesh that clay shows: what comes in between the lips.
+
+    vertices: the posed (n, 3) of shown_meshes, the skin first
     """
     skin, inside = vertices[0], rig.regions.get("mouth_interior")
+    opening = _opening(rig)
+    # Painted parts have half of their shade in their maps (parts.mouth_light), the bare lining none.
     shades = [
-        _shade(rig, skin, now) if mesh.name.startswith(BEHIND_LIPS) else None
+        _shade(skin, opening, now) ** 0.5 if mesh.name.startswith(BEHIND_LIPS) else None
         for mesh, now in zip(shown_meshes(rig, textured=False), vertices)
     ]
     if inside is not None:
         shades[0] = np.ones(len(skin))
-        shades[0][inside] = _shade(rig, skin, skin[inside])
+        shades[0][inside] = _shade(skin, opening, skin[inside])
     return shades
 
 
-def _shade(rig, skin, points):
-    """(k,) share of the light that reaches points (k, 3) behind the lips of a posed skin (n, 3)."""
-    lips = [skin[line[len(line) // 2], 2] for name, line in rig.lines.items() if name.startswith("lip_seam")]
-    depth = np.maximum((max(lips) if lips else points[:, 2]) - points[:, 2], 0.0)
-    return 1.0 / (1.0 + (depth / MOUTH_LIGHT_MM) ** 2)
+def _opening(rig):
+    """(m, 3) faces that span the skin's mouth from one line of the lips to the other; none without those lines."""
+    if not {"lip_seam_upper", "lip_seam_lower"} <= set(rig.lines):
+        return np.zeros((0, 3), int)
+    upper, lower = (np.asarray(rig.lines[f"lip_seam_{lip}"]) for lip in ("upper", "lower"))
+    strips = (upper[:-1], lower[:-1], upper[1:]), (upper[1:], lower[:-1], lower[1:])
+    return np.concatenate([np.stack(strip, axis=1) for strip in strips])
+
+
+def _shade(skin, opening, points):
+    """(k,) share of the light that reaches points (k, 3) through the opening (m, 3) of a posed skin (n, 3)."""
+    if not len(opening):
+        return np.ones(len(points))
+    seen = np.clip(2.0 * winding_numbers(skin, opening, points), 0.0, 1.0)  # share of half a sphere
+    return LEAST_LIGHT + (1.0 - LEAST_LIGHT) * np.minimum(seen / ALL_SEEN, 1.0)
 
 
 def _clay_with_dark_inside(rig):

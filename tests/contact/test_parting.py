@@ -83,11 +83,7 @@ def test_nothing_is_parted_into_what_is_solid(pads, parting):
     _, F, upper = pads
     pose = pressed(pads, 0.1)
     top = pose[upper, 2].max() + 0.02
-
-    def down(points):
-        return np.minimum(top - points[:, 2], 0.0)[:, None] * [0.0, 0.0, 1.0]
-
-    field = parting([pose], [1.0], [down])
+    field = parting([pose], [1.0], [ceiling(top)])
     assert (pose + field)[:, 2].max() <= top + 1e-6
     assert not len(self_intersections(pose + field, F))
 
@@ -131,3 +127,33 @@ def test_poses_that_are_clean_stay_clean(pads, parting):
     field = parting([V + motion, near], [1.0, share], [np.zeros_like] * 2, clean=1)
     left = [len(self_intersections(pose + act * field, F)) for pose, act in ((V + motion, 1.0), (near, share))]
     assert left == [0, 0]
+
+
+def ceiling(top):
+    """A function of points: their ways back below z = top."""
+    return lambda points: np.minimum(top - points[:, 2], 0.0)[:, None] * [0.0, 0.0, 1.0]
+
+
+def test_on_the_way_too_nothing_is_parted_into_what_is_solid(pads, parting):
+    V, F, upper = pads
+    pose = pressed(pads, 0.1)
+    half = 0.5 * (V + pose)
+    lowest = np.flatnonzero(upper)[half[upper, 2].argmin()]
+    solid = ceiling(half[lowest, 2])  # what lies in it already may stay as deep
+
+    free = parting([pose], [1.0], [np.zeros_like])
+    held = parting([pose, half], [1.0, 0.5], [np.zeros_like, solid], on_way=1)
+    assert free[lowest, 2] > 0.01
+    assert np.abs(held[upper, 2]).max() < 1e-6
+    assert not len(self_intersections(pose + held, F))
+
+
+def test_what_corrections_have_brought_into_a_solid_together_goes_back(pads, parting):
+    left, pose = pads[0], pads[0].copy()
+    highest = left[:, 2].argmax()
+    pose[highest, 2] += 0.4
+    solid = ceiling(left[highest, 2] + 0.1)
+    assert not parting([pose], [1.0], [solid]).any()  # contact has left it there
+    field = parting([pose], [1.0], [solid], left=[left])
+    assert np.isclose((pose + field)[highest, 2], left[highest, 2] + 0.1)
+    assert np.flatnonzero(field.any(axis=1)).tolist() == [highest]

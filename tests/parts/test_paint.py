@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from facewright.parts.paint import PAINTERS
+from facewright.parts.paint import PAINTERS, plain_map
 
 LOOKS = {"teeth": {"cells": (7, 4)}}
 
@@ -16,11 +16,15 @@ def test_painting_is_deterministic(name):
     np.testing.assert_array_equal(image, PAINTERS[name](look, 64))
 
 
-def test_teeth_darken_towards_gum_and_back():
+def test_teeth_darken_towards_the_gum():
     image = PAINTERS["teeth"](LOOKS["teeth"], 448).astype(float).mean(axis=2)
     cell = image[:112, :64]
     assert cell[12, 32] < cell[60, 32]
-    assert image[60, 32] > image[60, 6 * 64 + 32]
+
+
+def test_a_plain_map_has_the_colour_that_was_asked_for():
+    image = plain_map((1.0, 0.214, 0.0), 8)
+    assert image.shape == (8, 8, 3) and (image == [255, 127, 0]).all()
 
 
 def test_hairs_thin_out_and_strips_fade():
