@@ -21,6 +21,8 @@ from facewright.mesh.tangents import corner_tangents, from_tangent_space
 CLAY_LINEAR = srgb_to_linear(np.array(CLAY))
 AMBIENT = 0.16
 MAX_LAYERS = 12
+ONWARD_MM = 0.002
+"""Behind what is seen through: a strip may lie on the skin, and single precision is 100 times finer."""
 MIN_ROUGHNESS = 0.18
 EDGE_THRESHOLD = 0.04
 RAY_CHUNK = 1 << 17
@@ -139,7 +141,7 @@ class Scene:
             onward = light > 0.01
             active, hits_at = active[onward], hits_at[onward]
             way = directions[active]
-            start = start[hits_at] + way * (hits.distance[hits_at] + 0.01)[:, None]
+            start = start[hits_at] + way * (hits.distance[hits_at] + ONWARD_MM)[:, None]
             if not len(active):
                 break
         return image + through[:, None] * background

@@ -33,6 +33,12 @@ def test_transparency_mixes_linear_light():
     np.testing.assert_allclose(image[20, 20], expected, atol=1)
 
 
+def test_what_lies_just_behind_a_transparent_strip_is_seen_and_not_what_lies_behind_that():
+    layers = [square(0, color=BLUE), square(1, color=RED), square(1.005, color=BLUE, opacity=0.25)]
+    image = Scene(layers).render(CAMERA, unlit=True)
+    np.testing.assert_allclose(image[20, 20], linear_to_srgb(np.array([0.75, 0, 0.25])) * 255, atol=1)
+
+
 def test_shade_takes_light_and_gloss_alike():
     looks = {"color": RED, "roughness": 0.2}
     bright, dark = (Scene([square(**looks, shade=np.full(4, share))]).render(CAMERA)[20, 20] for share in (1.0, 0.0))
