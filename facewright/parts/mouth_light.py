@@ -2,8 +2,8 @@
 
 Teeth, gums and tongue get what light reaches them on average over the poses that show them, seen on the template. So
 front teeth stay light, while back teeth, inner sides, necks at the gums and the depth of a mouth go dark, in any
-template's own UVs. Tried: no spreading (fissures and gaps of the back teeth look like caries), FULL at 0.65 (a smile
-looks grey).
+template's own UVs. Tried: no spreading (fissures and gaps of the back teeth look like caries), poses without tongueOut
+(then a tongue that is out is dark).
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ POSES = (
     {"mouthUpperUpLeft": 1.0, "mouthUpperUpRight": 1.0, "mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0},
     {"mouthFunnel": 1.0, "jawOpen": 0.2},
     {"jawOpen": 0.8},
+    {"tongueOut": 1.0},
 )
-FULL = 0.55  # mean openness of a front tooth between lips that are drawn back: nothing in a mouth has more light
+FULL = 0.7  # openness that counts as full light: of front teeth between lips that are drawn back
 BOUNCE = 0.55  # power: bright teeth and wet walls hand light on
 LEAST = 0.1  # share of the light that comes to the darkest place by way of the mouth's walls
 WALLS = (0.82, 1.07, 1.16)  # powers of the light: what has come so deep has met red skin before
@@ -49,14 +50,16 @@ def mouth_light(template):
     # Whatever else stands in the way of light (lashes, corneas) is far from a mouth.
     faces = np.concatenate([template.faces[p.face_slice] for p in (template.skin, *parts)])
     shapes = dict(zip(template.shape_names, template.deltas))
-    total = np.zeros(len(asked))
+    found = []
     for pose in POSES:
         moved = template.vertices + sum(weight * shapes[name] for name, weight in pose.items() if name in shapes)
-        total += vertex_openness(moved, faces, n_directions=_DIRECTIONS, subset=asked)
-    comes = np.minimum(total / (len(POSES) * FULL), 1.0) ** BOUNCE
+        found.append(vertex_openness(moved, faces, n_directions=_DIRECTIONS, subset=asked))
+    # A pose counts by the light that it lets in: what is dark in it is hardly seen in it.
+    openness = np.square(found).sum(axis=0) / np.maximum(np.sum(found, axis=0), 1e-9)
+    comes = np.minimum(openness / FULL, 1.0) ** BOUNCE
     own = np.searchsorted(asked, np.concatenate([template.faces[part.face_slice] for part in parts]))
     light[asked] = LEAST + (1.0 - LEAST) * _spread(comes, template.vertices[asked], own)
-    return light
+    return 0.5 * (light + light[template.mirror])  # rays are few, and not the same on both sides
 
 
 def _spread(light, vertices, faces):

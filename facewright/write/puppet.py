@@ -16,6 +16,7 @@ from facewright.write.sheet import PANEL
 BACKGROUND = tuple(c / 255.0 for c in PANEL)
 INNER_SHADE = 0.45
 LEAST_LIGHT = 0.15  # behind shut lips
+OUTSIDE = 5.0  # times that share counts before the opening, as at a tongue that is out: there the rest is open as well
 ALL_SEEN = 0.45  # share of half a sphere that the mouth's opening takes where all of the light comes in
 BEHIND_LIPS = ("teeth_", "gums_", "tongue")
 CLAY_MAP_PX = 256
@@ -151,7 +152,8 @@ def _shade(skin, opening, points):
     """(k,) share of the light that reaches points (k, 3) through the opening (m, 3) of a posed skin (n, 3)."""
     if not len(opening):
         return np.ones(len(points))
-    seen = np.clip(2.0 * winding_numbers(skin, opening, points), 0.0, 1.0)  # share of half a sphere
+    seen = 2.0 * winding_numbers(skin, opening, points)  # share of half a sphere; less than 0 before the opening
+    seen = np.where(seen < 0.0, -OUTSIDE * seen, seen)
     return LEAST_LIGHT + (1.0 - LEAST_LIGHT) * np.minimum(seen / ALL_SEEN, 1.0)
 
 

@@ -45,6 +45,14 @@ def test_teeth_between_funnelled_lips_have_less_light_than_in_a_smile(rig):
     assert (mouth_shades(without, [mesh.vertices for mesh in meshes])[at] == 1.0).all()
 
 
+def test_a_tongue_that_is_out_lies_in_the_light(rig):
+    meshes, play = shown_meshes(rig, textured=False), Player(rig, full=True)
+    at = [mesh.name for mesh in meshes].index("tongue")
+    posed = play.meshes(meshes, {"tongueOut": 1.0, "jawOpen": 0.5})
+    shade, depth = mouth_shades(rig, posed)[at], posed[at][:, 2].max() - posed[at][:, 2]
+    assert shade[depth < 10.0].min() > 0.85 > 0.6 > shade[depth > 60.0].max()
+
+
 def test_a_pose_leaves_no_trace(rig):
     puppet, camera = Puppet(rig), close_up_cameras(rig)[2]
     before = puppet.picture({}, camera)
