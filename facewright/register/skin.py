@@ -38,8 +38,8 @@ HOLD, HELD_FROM_MM, LEAST_HELD, LOOSE = 3e-3, 15.0, 0.3, 1e-4
 class SkinRules:
     """Per skin vertex: trust (n,) 0..1 of data, stiffness (n,), inward and outward reach (n,) mm.
 
-    hairy (n,) bool: hair may cover it, which relief and colour tell; curtained (n,) bool: hair may hang before it,
-    which only colour tells, for bearded cheeks are as rough
+    hairy (n,) bool: hair may cover it, which the relief tells; curtained (n,) bool: hair may cover it or hang before it,
+    which the colour tells: bearded cheeks are as rough, and a throat in the shade of its chin is as dark
     hold (n,): how much it is held to the model, against data of one per mm2
     """
 
@@ -59,7 +59,7 @@ class SkinRules:
         """
         smooth = np.clip((HAIR_RATIO - found.roughness) / (HAIR_RATIO - SKIN_RATIO), 0.0, 1.0)
         inside = (height <= self.outward[rows].min(axis=1)) & (height >= -self.inward[rows].min(axis=1))
-        hairy, curtained = self.hairy[rows].any(axis=1), (self.hairy | self.curtained)[rows].any(axis=1)
+        hairy, curtained = self.hairy[rows].any(axis=1), self.curtained[rows].any(axis=1)
         return inside * np.where(hairy, smooth, 1.0) * np.where(curtained, np.clip(1.0 - found.hair, 0.0, 1.0), 1.0)
 
 
@@ -85,7 +85,7 @@ def skin_rules(template):
     ears = regions["ear_left"] | regions["ear_right"]
     hairy = regions["outer"] & away & (above | ~regions["face"]) & ~ears
     outward[hairy & regions["face"]] = 5.0
-    curtained = regions["face"] & away & ~ears & (vertices[:, 1] > vertices[regions["lips"], 1].mean())
+    curtained = regions["outer"] & away & ~ears & (vertices[:, 1] > vertices[regions["lips"], 1].mean())
     led, outside = (
         np.minimum(cKDTree(vertices[mask]).query(vertices)[0] / HELD_FROM_MM, 1.0)
         for mask in (regions["eyes"] | regions["lips"], regions["outer"] & ~regions["face"])

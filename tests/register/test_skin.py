@@ -63,4 +63,6 @@ def test_hair_before_a_cheek_is_told_by_its_colour_and_a_beard_is_not(hm08):
 
     assert (believed(cheek, 5.0, 0.0) == 1).all() and (believed(cheek, 0.5, 1.0) == 0).all()
     assert (believed(chin, 5.0, 1.0) == 1).all()
-    assert (believed(rules.hairy, 5.0, 0.0) == 0).all() and (believed(rules.hairy, 0.5, 1.0) == 0).all()
+    assert (believed(rules.hairy, 5.0, 0.0) == 0).all()
+    throat = rules.hairy & ~rules.curtained
+    assert throat.any() and (believed(throat, 0.5, 1.0) == 1).all()
