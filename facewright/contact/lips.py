@@ -138,6 +138,11 @@ class LipContact:
         skin = (self.V + motion(weight))[self.used]
         return self._of_head(self.slit.shut(skin, lifted) / (acts(weight) if acts else weight))
 
+    def ajar(self, motion, weights=None, acts=None):
+        """Whether a motion opens a slit of ajar_mm between the lips; arguments as of shut."""
+        skin = (self.V + motion(self._where_it_acts_most(weights, acts)))[self.used]
+        return bool(self.slit.wishes(skin)[1].max() >= self.options.ajar_mm)
+
     def _where_it_acts_most(self, weights, acts):
         return max(weights or self.options.weights, key=acts or (lambda weight: weight))
 

@@ -348,7 +348,12 @@ class _Mouth:
         shut, twice = _stays_shut(pose)
         if shut:
             first = first + self.contact.shut(motion, weights, acts, lifted=twice)
-        return first + self.contact.apart(motion, weights, acts, closed, shut)
+        first = first + self.contact.apart(motion, weights, acts, closed, shut)
+        # Lips that two shapes have taken far through each other part with a slit; from there it is a short way to shut.
+        if twice and self.contact.ajar(motion, weights, acts):
+            first = first + self.contact.shut(motion, weights, acts, lifted=True)
+            first = first + self.contact.apart(motion, weights, acts, closed, shut)
+        return first
 
     def _too_much(self, targets, pose):
         """(n, 3) what a pose does twice: the ring of muscle around the mouth draws together only once."""

@@ -9,7 +9,7 @@ import igl
 import numpy as np
 from scipy.ndimage import binary_opening
 
-from facewright.conventions import SHUT_PAIRS, SHUT_SHAPES
+from facewright.conventions import MOUTH_PAIRS, SHUT_PAIRS, SHUT_SHAPES
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.rows import Row
 from facewright.evaluate.shapes import shape_names
@@ -98,7 +98,9 @@ def teeth_rows(rig):
 def shut_poses(rig):
     """name -> weights of the poses of a rig under which lips that are shut stay shut."""
     names = shape_names(rig)
-    poses = {" + ".join(pose): dict.fromkeys(pose, 1.0) for pose in (*((name,) for name in SHUT_SHAPES), *SHUT_PAIRS)}
+    single = ((name,) for name in SHUT_SHAPES)
+    pairs = (pair for pair in MOUTH_PAIRS if set(pair) <= set(SHUT_SHAPES))
+    poses = {" + ".join(pose): dict.fromkeys(pose, 1.0) for pose in (*single, *pairs, *SHUT_PAIRS)}
     found = {name: both_sides(weights, names) for name, weights in poses.items()}
     return {name: weights for name, weights in found.items() if weights is not None}
 

@@ -145,3 +145,26 @@ def test_a_jaw_that_goes_forward_keeps_lips_shut_and_off_each_other_on_the_way(h
     contact = _Mouth(person, MouthOptions()).contact
     pose = (person.vertices + targets.delta("jawForward"))[contact.used]
     assert max(gaps.max() for gaps in contact.slit.gaps(pose)) < 0.3
+
+
+def test_a_mouth_is_ajar_where_its_lips_are_drawn_apart(solved):
+    """It is asked at the weight at which a correction would act most."""
+    person, _, _ = solved
+    contact = _Mouth(person, MouthOptions()).contact
+    still, lifted = np.zeros_like(person.vertices), np.zeros_like(person.vertices)
+    lifted[contact.used[contact.sides[0]], 1] = 1.0
+    assert not contact.ajar(lambda weight: still)
+    assert contact.ajar(lambda weight: weight * lifted)
+    assert not contact.ajar(lambda weight: 0.1 * weight * lifted)
+    assert not contact.ajar(lambda weight: (weight > 0.5) * lifted, (0.5, 1.0), lambda weight: 1.0 - weight)
+
+
+def test_two_rolls_stay_shut(solved):
+    person, _, _ = solved
+    names = "mouthRollUpper", "mouthRollLower"
+    deltas = transfer_shapes(person)
+    raw = Targets(names, deltas[[person.template.shape_names.index(name) for name in names]])
+    targets = solve_mouth(person, raw, MouthOptions(pairs=(names,)))
+    contact = _Mouth(person, MouthOptions()).contact
+    pose = (person.vertices + targets.motion(dict.fromkeys(names, 1.0)))[contact.used]
+    assert max(gaps.max() for gaps in contact.slit.gaps(pose)) < 0.3

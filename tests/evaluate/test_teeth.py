@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from facewright.evaluate.teeth import SMILE, TONGUE, _Mouth
+from facewright.evaluate.teeth import SMILE, TONGUE, _Mouth, shut_poses
 from facewright.parts import build_rig
 
 
@@ -16,6 +16,13 @@ def rig(hm08, hm08_person):
 def test_a_smile_shows_six_teeth_and_closed_lips_none(rig):
     assert _Mouth(rig, SMILE, True).teeth_shown() >= 6
     assert _Mouth(rig, {}, True).teeth_shown() == 0
+
+
+def test_shapes_that_keep_lips_shut_are_asked_for_a_slit_alone_and_in_pairs(rig):
+    poses = shut_poses(rig)
+    assert poses["mouthRollUpper + mouthRollLower"] == {"mouthRollUpper": 1.0, "mouthRollLower": 1.0}
+    assert {"mouthPucker", "mouthFrown + mouthPress", "mouthShrugUpper + mouthShrugLower"} <= set(poses)
+    assert not any("jawOpen" in weights or "mouthFunnel" in weights for weights in poses.values())
 
 
 def test_nothing_is_seen_but_between_the_lips(rig):
