@@ -38,8 +38,8 @@ HOLD, HELD_FROM_MM, LEAST_HELD, LOOSE = 3e-3, 15.0, 0.3, 1e-4
 class SkinRules:
     """Per skin vertex: trust (n,) 0..1 of data, stiffness (n,), inward and outward reach (n,) mm.
 
-    hairy (n,) bool: hair may cover it, which the relief tells; curtained (n,) bool: hair may cover it or hang before it,
-    which the colour tells: bearded cheeks are as rough, and a throat in the shade of its chin is as dark
+    hairy (n,) bool: hair may cover it, which the relief tells; curtained (n,) bool: hair may cover it or hang before
+    it, which the colour tells: bearded cheeks are as rough, and a throat in the shade of its chin is as dark
     hold (n,): how much it is held to the model, against data of one per mm2
     """
 
