@@ -139,9 +139,11 @@ class LipContact:
         return self._of_head(self.slit.shut(skin, lifted) / (acts(weight) if acts else weight))
 
     def ajar(self, motion, weights=None, acts=None):
-        """Whether a motion opens a slit of ajar_mm between the lips; arguments as of shut."""
+        """How far a motion opens a slit between the lips, mm summed over their lines; 0 where it is nowhere as high as
+        ajar_mm. Arguments as of shut."""
         skin = (self.V + motion(self._where_it_acts_most(weights, acts)))[self.used]
-        return bool(self.slit.wishes(skin)[1].max() >= self.options.ajar_mm)
+        heights = self.slit.wishes(skin)[1]
+        return float(heights.sum()) if heights.max() >= self.options.ajar_mm else 0.0
 
     def _where_it_acts_most(self, weights, acts):
         return max(weights or self.options.weights, key=acts or (lambda weight: weight))

@@ -31,6 +31,7 @@ from facewright.transfer.shapes import even_cut
 from facewright.transfer.within import region_shares
 
 HALF = 0.5
+_AGAIN = 2  # times that lips are shut and parted once more where two shapes that keep them shut leave a slit
 _MOVES_MM = 0.1  # of a lip: less cannot bring it into what it does not touch at rest
 PAIRS = (
     *MOUTH_PAIRS,
@@ -350,10 +351,16 @@ class _Mouth:
             first = first + self.contact.shut(motion, weights, acts, lifted=twice)
         first = first + self.contact.apart(motion, weights, acts, closed, shut)
         # Lips that two shapes have taken far through each other part with a slit; from there it is a short way to shut.
-        if twice and self.contact.ajar(motion, weights, acts):
+        best, least = first, self.contact.ajar(motion, weights, acts) if twice else 0.0
+        for _ in range(_AGAIN):
+            if not least:
+                break
             first = first + self.contact.shut(motion, weights, acts, lifted=True)
             first = first + self.contact.apart(motion, weights, acts, closed, shut)
-        return first
+            left = self.contact.ajar(motion, weights, acts)
+            if left < least:
+                best, least = first, left
+        return best
 
     def _too_much(self, targets, pose):
         """(n, 3) what a pose does twice: the ring of muscle around the mouth draws together only once."""
