@@ -14,7 +14,7 @@ from facewright.mesh.winding import winding_numbers
 from facewright.write.sheet import PANEL
 
 BACKGROUND = tuple(c / 255.0 for c in PANEL)
-INNER_SHADE = 0.45
+INNER_SHADE = 0.2
 LEAST_LIGHT = 0.15  # behind shut lips
 OUTSIDE = 5.0  # times that share counts before the opening, as at a tongue that is out: there the rest is open as well
 ALL_SEEN = 0.45  # share of half a sphere that the mouth's opening takes where all of the light comes in
