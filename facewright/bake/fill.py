@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import dilate, unique_edges
 from facewright.mesh.fade import smooth_step
+from facewright.mesh.render import LUMA
 from facewright.solve.quadratic import Factorization
 
 TRUSTED_MM = 2.0
@@ -39,7 +40,6 @@ RIDGE = 1e-6
 FORGET_MM = 30.0
 # The other side is no model for the skin this near to what neither side shows: hair begins there, on each its own way.
 LOST_MM = 10.0
-LUMA = np.array([0.299, 0.587, 0.114])
 # Multiplies the mean skin colour (sRGB): what is found this many mm behind the rim.
 INTERIORS = {
     "mouth_interior": ((0.42, 0.20, 0.22), 6.0),

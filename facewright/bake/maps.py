@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from facewright.bake.fill import LUMA, feather, hair_stains, solve_fill, surface_distance
+from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
 from facewright.bake.project import project_to_scan
 from facewright.bake.pyramid import push_pull
@@ -28,7 +28,7 @@ from facewright.bake.texels import (
 )
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
-from facewright.mesh.render import linear_to_srgb
+from facewright.mesh.render import LUMA, linear_to_srgb
 from facewright.mesh.tangents import corner_tangents, to_tangent_space
 
 SEEN, FILLED, INSIDE = 255, 128, 0

@@ -37,7 +37,9 @@ def folded_faces(surface, fit, faces, mask, *, nearby_mm=SURFACE_NEARBY_MM):
     folded = []
     for suspect, limit, near in zip(suspects, limits, around):
         its_way = np.array(near)[scan_normals[near] @ normals[suspect] > 0]
-        alone = Surface(corners[its_way].reshape(-1, 3), np.arange(3 * len(its_way)).reshape(-1, 3))
-        if not len(its_way) or alone.nearest(centers[suspect][None])[2][0] > limit:
-            folded.append(suspect)
+        if len(its_way):
+            alone = Surface(corners[its_way].reshape(-1, 3), np.arange(3 * len(its_way)).reshape(-1, 3))
+            if alone.nearest(centers[suspect][None])[2][0] <= limit:
+                continue
+        folded.append(suspect)
     return asked[np.array(folded, np.int64)]

@@ -12,6 +12,8 @@ CLAY = (0.80, 0.66, 0.57)
 BACKGROUND = (0.13, 0.13, 0.15)
 # Key, fill and rim light in camera space (right, up, towards the viewer), with strength.
 LIGHTS = ((-0.45, 0.55, 0.70, 0.85), (0.75, 0.10, 0.55, 0.30), (0.0, -0.8, 0.3, 0.12))
+LUMA = np.array([0.299, 0.587, 0.114])
+"""Shares of sRGB channels in brightness (ITU-R BT.601)."""
 
 
 def sample_texture(image, uv):

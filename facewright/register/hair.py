@@ -7,11 +7,10 @@ from scipy.spatial import cKDTree
 
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_areas
+from facewright.mesh.render import LUMA
 from facewright.register.colors import surface_colors
 
-LUMA = np.array([0.299, 0.587, 0.114])
-# Brightness (sRGB, of the nearest skin's): what is surely hair, what may be skin in the shade. Black hair is at 0.1 to
-# 0.4 of its own skin's brightness, temples and necks of scans with light from one side at 0.6 and more.
+# Brightness (sRGB, of the nearest skin's): what is surely hair, what may be skin in the shade.
 SURELY, HARDLY = 0.35, 0.55
 NEAREST = 3
 WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
