@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from facewright.contact.gaze import gaze_rotation, look_shapes
 from facewright.contact.lids import LidMotionOptions, Lids
+from facewright.contact.pouch import LidLining
 from facewright.contact.retraction import needed_retraction
 from facewright.contact.rims import from_ends
 from facewright.contact.targets import Targets
@@ -24,6 +25,7 @@ from facewright.mesh.normals import max_norms
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
+_PRESSING_LOOKS, _RAISING = ("Down", "Out"), ("cheekSquint", "noseSneer")
 _BLINK_STEPS = 0.35, 0.7, 1.0  # a lid turns farthest; chords of a third of its way stay out of the ball
 _FULLNESS = 0.6
 _CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
@@ -74,9 +76,12 @@ class EyeShapes:
                 if poses:
                     in_betweens[name] = {weight: in_between_name(name, weight) for weight in poses}
                     extras |= {in_betweens[name][weight]: delta for weight, delta in poses.items()}
+            pressed = eye.pressed(names, result)
+            for name, cleared in eye.raised(names, result, pressed):
+                result[names.index(name)] = cleared
             for pair in eye.diagonals(names):
                 target = corrective_name(pair)
-                extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair])
+                extras[target] = eye.diagonal(pair, [result[names.index(name)] for name in pair], pressed)
                 correctives[target] = pair
         blinks = [(eye, result[names.index(eye.blink)]) for eye in self._eyes if eye.blink in names]
         back = max([eye.retraction(blink) for eye, blink in blinks], default=0.0)
@@ -120,6 +125,9 @@ class _Eye:
         self.lids = Lids(self.V, faces, upper, lower, free, ~socket, self.ball, options.lids)
         faces = faces[: len(faces) // 2]
         self.lid_faces = faces[(free & ~socket)[faces].all(axis=1)]
+        near = distance < options.free_mm
+        lining = faces[(socket[faces] & near[faces]).any(axis=1)]
+        self.lining = LidLining(self.lid_faces, lining, distance, socket & near, self.ball.center)
         self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
 
     def shapes(self, names, deltas):
@@ -140,6 +148,45 @@ class _Eye:
                 own = deltas[names.index(name), self.skin]
                 found[name] = {w: self._look(direction, own, w) for w in (HALF, 1.0)}
         return found
+
+    def pressed(self, names, shapes):
+        """(n, 3) motion of the skin under the squint of shapes (s, n, 3), beside which others must clear the ball."""
+        squint = f"eyeSquint{self.side.capitalize()}"
+        return shapes[names.index(squint)][self.skin] if squint in names else np.zeros_like(self.V)
+
+    def raised(self, names, shapes, pressed):
+        """(name, (n, 3) delta) of the shapes that bring a lid and the ball together, fit to be played with each other.
+
+        pressed (n, 3): as above. A cheek is raised, and a nose wrinkled, beside each of what comes before them.
+        """
+        rest = np.zeros_like(self.V)
+        ahead = down = rest, self.ball
+        for name, direction in look_shapes(self.side).items():
+            if name in names and direction in _PRESSING_LOOKS:
+                ball = self.ball.turned(gaze_rotation(direction, self.side))
+                delta = self._cleared(shapes[names.index(name)], [(pressed, ball)])
+                if direction == "Down":
+                    down = delta[self.skin], ball
+                yield name, delta
+        raised = rest
+        for name in (f"{shape}{self.side.capitalize()}" for shape in _RAISING):
+            if name not in names:
+                continue
+            with_others = [
+                (raised + squints + look, ball) for squints in (rest, pressed) for look, ball in (ahead, down)
+            ]
+            delta = self._cleared(shapes[names.index(name)], [ahead, *with_others[1:]])
+            raised = raised + delta[self.skin]
+            yield name, delta
+
+    def _cleared(self, delta, beside):
+        """A shape's (n, 3) delta with lids clear of a ball, and their lining behind them, beside each of some motions
+        of the skin (n, 3) and the ball as it has turned then."""
+        delta = delta.copy()
+        for motion, ball in beside:
+            pose = self.V + motion + delta[self.skin]
+            delta[self.skin] += self.lining.kept_behind(self.lids.lifted(pose, ball)) - pose
+        return delta
 
     def retraction(self, blink):
         """mm by which this eye's ball must draw back in its blink (n, 3)."""
@@ -176,14 +223,16 @@ class _Eye:
         pairs = [(f"eyeLook{a}{side}", f"eyeLook{b}{side}") for a in ("In", "Out") for b in ("Down", "Up")]
         return [pair for pair in pairs if set(pair) <= set(names)]
 
-    def diagonal(self, pair, shapes):
-        """(n, 3) what lifts the lids off a cornea that looks past a corner; shapes: the pair's (n, 3) deltas."""
+    def diagonal(self, pair, shapes, pressed):
+        """(n, 3) what lifts the lids off a cornea that looks past a corner; shapes: the pair's (n, 3) deltas; pressed
+        (n, 3): the skin's motion in a squint, beside which it must do so too."""
         pose = self.V + sum(shape[self.skin] for shape in shapes)
         looks = look_shapes(self.side)
         turns = [gaze_rotation(looks[name], self.side) for name in pair]
         R = Rotation.from_rotvec(sum(Rotation.from_matrix(turn).as_rotvec() for turn in turns)).as_matrix()
         ball = self.ball.turned(R)
         full = self._full(self.lids.settled(self.lids.lifted(pose, ball), ball), pose)
+        full = self._cleared(full, [(pose - self.V + pressed, ball)])
         # Two turns added up as chords swell the ball: it gets the one turn that they mean.
         missing = R - turns[0] - turns[1] + np.eye(3)
         for part in eye_parts(self.face.template, self.side):
