@@ -135,7 +135,7 @@ class Scene:
             face, barycentric = self._near[hits.face[hits_at]], hits.barycentric[hits_at].astype(np.float32)
             color, opacity = self._shade(face, barycentric, camera, pixel_mm, unlit)
             light = through[active]
-            image[active] += color * (light * opacity)[:, None]
+            image[active] += color * light[:, None]
             light *= 1.0 - opacity
             through[active] = light
             onward = light > 0.01
@@ -147,10 +147,10 @@ class Scene:
         return image + through[:, None] * background
 
     def _shade(self, face, barycentric, camera, pixel_mm, unlit):
-        """Linear colours (k, 3) and opacities (k,) at hits."""
+        """What hits add to a picture, linear (k, 3), and their opacities (k,)."""
         mixed = _mix(self._looks_at, self.faces[face], barycentric)
         normal, color, shade = normalized(mixed[:, :3]), mixed[:, 3:6], mixed[:, 6:]
-        opacity = np.ones(len(face), np.float32)
+        opacity, there = np.ones((2, len(face)), np.float32)
         gloss = np.zeros(len(face), np.float32)
         owner = np.searchsorted(self.first_face, face, side="right") - 1
         for number in np.unique(owner):
@@ -162,13 +162,16 @@ class Scene:
             if looks.needs_uv:
                 uv = _mix_corners(looks.uv_corners, local, barycentric[chosen])
                 if looks.texture is not None:
-                    color[chosen], opacity[chosen] = looks.albedo(uv, pixel_mm)
+                    color[chosen], there[chosen] = looks.albedo(uv, pixel_mm)
                 if looks.normal_map is not None:
                     frames = self._frames[number]
                     normal[chosen] = looks.bent(frames, normal[chosen], local, barycentric[chosen], uv, pixel_mm)
+        opacity *= there
         if unlit:
-            return color, opacity
-        return shade * _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
+            return color * opacity[:, None], opacity
+        # What is clear, as a cornea, mirrors as much as if it were not; a map's alpha says that nothing is there.
+        local = normal @ camera.R.T.astype(np.float32)
+        return shade * (_matt(local, color) * opacity[:, None] + (_shine(local, gloss) * there)[:, None]), opacity
 
 
 class _Looks:
@@ -195,10 +198,9 @@ class _Looks:
         return tuple(array.astype(np.float32) for array in corner_tangents(vertices, faces, normals, uv, uv_faces))
 
     def albedo(self, uv, pixel_mm):
-        """Linear colours (k, 3) and opacities (k,)."""
+        """Linear colours (k, 3) and the map's own opacities (k,), 1 where it has none."""
         sample = _bilinear(self._level("texture", pixel_mm), uv) / np.float32(255.0)
-        opacity = sample[:, 3] * self.opacity if sample.shape[1] == 4 else np.float32(self.opacity)
-        return srgb_to_linear(sample[:, :3]), opacity
+        return srgb_to_linear(sample[:, :3]), sample[:, 3] if sample.shape[1] == 4 else np.float32(1.0)
 
     def bent(self, frames, normal, face, barycentric, uv, pixel_mm):
         """Normals (k, 3) turned by the normal map."""
@@ -269,22 +271,25 @@ def _bilinear(image, uv):
     return upper * (1 - fy) + lower * fy
 
 
-def _lit(local, color, roughness):
-    """Linear colours of camera-space normals (k, 3) under the lights: Lambert, and for smooth surfaces the key light's
-    highlight (Blinn-Phong; three lights would put three dots into an eye).
-    """
+def _matt(local, color):
+    """Linear colours of camera-space normals (k, 3) under the lights: Lambert."""
     light = np.full(len(local), AMBIENT, np.float32)
     for x, y, z, strength in LIGHTS:
         light += np.float32(strength) * np.maximum(local @ _unit(x, y, z), 0.0)
-    image = color * light[:, None]
+    return color * light[:, None]
+
+
+def _shine(local, roughness):
+    """(k,) the key light's highlight on smooth surfaces with camera-space normals (k, 3) (Blinn-Phong; three lights
+    would put three dots into an eye)."""
+    result = np.zeros(len(local), np.float32)
     glossy = np.flatnonzero(roughness < 0.5)
     if len(glossy):
         x, y, z, strength = LIGHTS[0]
         power = 2.0 / np.maximum(roughness[glossy], MIN_ROUGHNESS) ** 4 - 2.0
         facing = np.maximum(local[glossy] @ _unit(*(_unit(x, y, z) + [0, 0, 1])), 0.0)
-        shine = strength * 0.04 * (power + 2.0) / 8.0 * facing**power
-        image[glossy] += np.minimum(shine, 2.0)[:, None]
-    return image
+        result[glossy] = np.minimum(strength * 0.04 * (power + 2.0) / 8.0 * facing**power, 2.0)
+    return result
 
 
 def _unit(x, y, z):
