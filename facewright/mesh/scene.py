@@ -22,7 +22,8 @@ CLAY_LINEAR = srgb_to_linear(np.array(CLAY))
 AMBIENT = 0.16
 MAX_LAYERS = 12
 ONWARD_MM = 0.002
-"""Behind what is seen through: a strip may lie on the skin, and single precision is 100 times finer."""
+"""Behind what is seen through, which single precision tells 100 times finer; what lies nearer is looked for by itself,
+since a strip may lie on the skin."""
 MIN_ROUGHNESS = 0.18
 EDGE_THRESHOLD = 0.04
 RAY_CHUNK = 1 << 17
@@ -91,6 +92,7 @@ class Scene:
                     _normals_of(now, drawable.faces, self._near[slice(*bounds[i : i + 2])] - self.first_face[i])
                 )
         light = [np.ones(len(now)) if shade is None else shade for now, shade in zip(vertices, shades)]
+        self._vertices, self._solid = every, None
         self._looks_at = np.concatenate(
             [np.concatenate(normals), self._colors, np.concatenate(light)[:, None]], axis=1, dtype=np.float32
         )
@@ -126,8 +128,10 @@ class Scene:
         through = np.ones(len(origins), np.float32)
         active = np.arange(len(origins))
         start, way = origins, directions
-        for _ in range(MAX_LAYERS):
+        for layer in range(MAX_LAYERS):
             hits = self.rays.cast(start, way)
+            if layer > 0:
+                self._find_passed(hits, start, way)
             hits_at = np.flatnonzero(hits.face >= 0)
             active = active[hits_at]
             if not len(active):
@@ -145,6 +149,23 @@ class Scene:
             if not len(active):
                 break
         return image + through[:, None] * background
+
+    def _find_passed(self, hits, start, way):
+        """Put into hits what hides all behind it and lies where the rays have just passed something see-through."""
+        if self._solid is None:
+            through = np.repeat([looks.seen_through for looks in self._looks], np.diff(self.first_face))[self._near]
+            corners = self._vertices[self.faces[self._near]]
+            low, high = corners[through].min(axis=(0, 1)), corners[through].max(axis=(0, 1))
+            beside = (corners.min(axis=1) > high + ONWARD_MM) | (corners.max(axis=1) < low - ONWARD_MM)
+            at = np.flatnonzero(~through & ~beside.any(axis=1))
+            self._solid = at, RayScene(self._vertices, self.faces[self._near[at]]) if len(at) else None
+        at, rays = self._solid
+        if rays is None:
+            return
+        found = rays.cast(start - 2.0 * ONWARD_MM * way, way, 2.0 * ONWARD_MM)
+        passed = np.flatnonzero(found.face >= 0)
+        hits.face[passed], hits.barycentric[passed] = at[found.face[passed]], found.barycentric[passed]
+        hits.distance[passed] = found.distance[passed] - 2.0 * ONWARD_MM
 
     def _shade(self, face, barycentric, camera, pixel_mm, unlit):
         """What hits add to a picture, linear (k, 3), and their opacities (k,)."""
@@ -181,6 +202,8 @@ class _Looks:
         self.roughness, self.opacity = drawable.roughness, drawable.opacity
         self.texture, self.normal_map = drawable.texture, drawable.normal_map
         self.needs_uv = drawable.uv is not None and (self.texture is not None or self.normal_map is not None)
+        with_alpha = self.needs_uv and self.texture is not None and self.texture.shape[2] == 4
+        self.seen_through = self.opacity < 1.0 or with_alpha
         self._levels = {"texture": [self.texture], "normal_map": [self.normal_map]}
         self._growing = threading.Lock()
         if not self.needs_uv:

@@ -39,6 +39,13 @@ def test_what_lies_just_behind_a_transparent_strip_is_seen_and_not_what_lies_beh
     np.testing.assert_allclose(image[20, 20], linear_to_srgb(np.array([0.75, 0, 0.25])) * 255, atol=1)
 
 
+def test_a_strip_in_the_same_place_as_the_skin_hides_none_of_it():
+    for shift in (0.0, 0.0005, -0.0005):
+        layers = [square(0, color=BLUE), square(1, color=RED), square(1 + shift, color=RED, opacity=0.25)]
+        image = Scene(layers).render(CAMERA, unlit=True)
+        assert (image[12:28, 12:28] == (255, 0, 0)).all()
+
+
 def test_shade_takes_light_and_gloss_alike():
     looks = {"color": RED, "roughness": 0.2}
     bright, dark = (Scene([square(**looks, shade=np.full(4, share))]).render(CAMERA)[20, 20] for share in (1.0, 0.0))
