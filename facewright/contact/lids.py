@@ -192,16 +192,16 @@ class Lids:
         result[inside] = factor.solve(-(rest @ field[~inside]))
         return result
 
-    def settled(self, pose, ball=None, shut=False):
+    def settled(self, pose, ball=None, shut=False, moved=False):
         """The pose (n, 3) without folded faces: where the corners press skin together it gives way, but not into the
-        ball, nor, where the lids are shut, into the other lid."""
+        ball, nor, where the lids are shut, into the other lid; moved as in Meeting."""
         for _ in range(_SETTLINGS):
             flat = laid_flat(self.V, pose, self._near_faces, self._ease)
             if flat is pose:
                 break
             pose = self.lifted(flat, ball)
             if shut:
-                pose = self._met(pose, unfolded=True)
+                pose = self._met(pose, unfolded=True, moved=moved)
         return pose
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
@@ -288,8 +288,8 @@ class Lids:
         outward = result - ball.center
         result += share * np.mean(rises, axis=0)[:, None] * normalized(outward)
         result = self.lifted(result + (1.0 - share) * motion, ball)
-        ways = (lambda: result, lambda: self._met(result, unfolded=True))
-        return self._soundest(self.settled(way(), ball, shut=True) for way in ways)
+        ways = (lambda: result, lambda: self._met(result, unfolded=True, moved=True))
+        return self._soundest(self.settled(way(), ball, shut=True, moved=True) for way in ways)
 
     def turn_of(self, shut, motion):
         """(l,) radians at the lower margin by which a motion (n, 3) turns shut lids (n, 3): half way between both."""

@@ -22,7 +22,8 @@ from facewright.mesh.overlap import barycentric, where_edges_pass
 from facewright.mesh.seam import seam_sides
 
 _REACH_MM, _LINING_MM = 8.0, 3.0  # over the skin and over the lining from the margins: what the other lid may meet
-_GAP_MM, _MARGIN_GAP_MM = 0.03, 0.01  # left between two lids, and beside their margins
+# Left between two lids: of a blink alone, which must be tight, of lids that another shape moves, and beside margins.
+_GAP_MM, _MOVED_GAP_MM, _MARGIN_GAP_MM = 0.015, 0.03, 0.01
 _OVER_MM, _OVER_ENDS_MM = 0.06, 3.0  # by which the upper margin passes the lower one, that far from the canthi
 _NEAR_MM, _DEEPEST_MM = 0.5, 4.0  # lids nearer than this over a place may come to meet there; deeper is no contact
 _MARGIN_EASE = 0.004  # how readily a margin gives way; the rest: 1
@@ -81,30 +82,31 @@ class Meeting:
         seen = _seen_area(along, self._far * angle, self._faces)
         front = (np.abs(seen) > _FRONT * self._area) & (outer | margins)[self._used][self._faces].all(axis=1)
         self._front, self._seen = self._faces[front], seen[front]
-        self._ease, self._gap = np.ones(len(self._used)), np.full(len(self._used), _GAP_MM)
+        self._ease, self._beside = np.ones(len(self._used)), np.full(len(self._used), np.inf)
         self._margins = []
         for line, sign in ((upper, 1.0), (lower, -1.0)):
             at, share = np.searchsorted(self._used, line), from_ends(vertices[line])
             self._margins.append((at, sign, -_OVER_MM * from_ends(vertices[line], _OVER_ENDS_MM)))
-            self._ease[at], self._gap[at] = _MARGIN_EASE, _MARGIN_GAP_MM * share
+            self._ease[at], self._beside[at] = _MARGIN_EASE, _MARGIN_GAP_MM * share
         self._ease[np.intersect1d(*(at for at, *_ in self._margins))] = 0.0
         self._laplacian = _laplacian(self._rest, self._faces)
         self._before = None
 
-    def __call__(self, pose, unfolded=False):
+    def __call__(self, pose, unfolded=False, moved=False):
         """The pose (n, 3) of shut lids with each lid on its side of the other one, turned as little as that takes.
 
-        unfolded  the pose has no folded faces, and shall have none
+        unfolded  the pose has no folded faces, and shall have none; moved: another shape moves the shut lids
         """
+        gap = np.minimum(_MOVED_GAP_MM if moved else _GAP_MM, self._beside)
         points = pose[self._used]
         along, radius, angle = self.axes.cylindrical(points)
         place, height = np.stack([along, radius], axis=1), self._far * angle
         motion = np.zeros(len(points))
-        for (at, sign, gap), (other, *_) in zip(self._margins, self._margins[::-1]):
-            motion[at] = 0.5 * (sign * gap - height[at] + along_line(along[at], along[other], height[other]))
+        for (at, sign, lap), (other, *_) in zip(self._margins, self._margins[::-1]):
+            motion[at] = 0.5 * (sign * lap - height[at] + along_line(along[at], along[other], height[other]))
         A, B = _contacts(place, height + motion, *self._lids), self._order(along)
         least = _LEAST_SHARE * np.abs(self._seen) / self._size(along)
-        over = np.append(A @ height + abs(A) @ (0.5 * self._gap), B @ height + least)
+        over = np.append(A @ height + abs(A) @ (0.5 * gap), B @ height + least)
         A = sp.vstack([A, B]).tocsr()
         for last in (False, True):
             rows, lack = A, over + A @ motion

@@ -22,7 +22,8 @@ CLAY_LINEAR = srgb_to_linear(np.array(CLAY))
 AMBIENT = 0.16
 MAX_LAYERS = 12
 ONWARD_MM = 0.002
-"""Behind what is seen through: a strip may lie on the skin, and single precision is 100 times finer."""
+"""Behind what is seen through, which single precision tells 100 times finer; what lies nearer is looked for by itself,
+since a strip may lie on the skin."""
 MIN_ROUGHNESS = 0.18
 EDGE_THRESHOLD = 0.04
 RAY_CHUNK = 1 << 17
@@ -91,6 +92,7 @@ class Scene:
                     _normals_of(now, drawable.faces, self._near[slice(*bounds[i : i + 2])] - self.first_face[i])
                 )
         light = [np.ones(len(now)) if shade is None else shade for now, shade in zip(vertices, shades)]
+        self._vertices, self._solid = every, None
         self._looks_at = np.concatenate(
             [np.concatenate(normals), self._colors, np.concatenate(light)[:, None]], axis=1, dtype=np.float32
         )
@@ -126,8 +128,10 @@ class Scene:
         through = np.ones(len(origins), np.float32)
         active = np.arange(len(origins))
         start, way = origins, directions
-        for _ in range(MAX_LAYERS):
+        for layer in range(MAX_LAYERS):
             hits = self.rays.cast(start, way)
+            if layer > 0:
+                self._find_passed(hits, start, way)
             hits_at = np.flatnonzero(hits.face >= 0)
             active = active[hits_at]
             if not len(active):
@@ -135,7 +139,7 @@ class Scene:
             face, barycentric = self._near[hits.face[hits_at]], hits.barycentric[hits_at].astype(np.float32)
             color, opacity = self._shade(face, barycentric, camera, pixel_mm, unlit)
             light = through[active]
-            image[active] += color * (light * opacity)[:, None]
+            image[active] += color * light[:, None]
             light *= 1.0 - opacity
             through[active] = light
             onward = light > 0.01
@@ -146,11 +150,28 @@ class Scene:
                 break
         return image + through[:, None] * background
 
+    def _find_passed(self, hits, start, way):
+        """Put into hits what hides all behind it and lies where the rays have just passed something see-through."""
+        if self._solid is None:
+            through = np.repeat([looks.seen_through for looks in self._looks], np.diff(self.first_face))[self._near]
+            corners = self._vertices[self.faces[self._near]]
+            low, high = corners[through].min(axis=(0, 1)), corners[through].max(axis=(0, 1))
+            beside = (corners.min(axis=1) > high + ONWARD_MM) | (corners.max(axis=1) < low - ONWARD_MM)
+            at = np.flatnonzero(~through & ~beside.any(axis=1))
+            self._solid = at, RayScene(self._vertices, self.faces[self._near[at]]) if len(at) else None
+        at, rays = self._solid
+        if rays is None:
+            return
+        found = rays.cast(start - 2.0 * ONWARD_MM * way, way, 2.0 * ONWARD_MM)
+        passed = np.flatnonzero(found.face >= 0)
+        hits.face[passed], hits.barycentric[passed] = at[found.face[passed]], found.barycentric[passed]
+        hits.distance[passed] = found.distance[passed] - 2.0 * ONWARD_MM
+
     def _shade(self, face, barycentric, camera, pixel_mm, unlit):
-        """Linear colours (k, 3) and opacities (k,) at hits."""
+        """What hits add to a picture, linear (k, 3), and their opacities (k,)."""
         mixed = _mix(self._looks_at, self.faces[face], barycentric)
         normal, color, shade = normalized(mixed[:, :3]), mixed[:, 3:6], mixed[:, 6:]
-        opacity = np.ones(len(face), np.float32)
+        opacity, there = np.ones((2, len(face)), np.float32)
         gloss = np.zeros(len(face), np.float32)
         owner = np.searchsorted(self.first_face, face, side="right") - 1
         for number in np.unique(owner):
@@ -162,13 +183,16 @@ class Scene:
             if looks.needs_uv:
                 uv = _mix_corners(looks.uv_corners, local, barycentric[chosen])
                 if looks.texture is not None:
-                    color[chosen], opacity[chosen] = looks.albedo(uv, pixel_mm)
+                    color[chosen], there[chosen] = looks.albedo(uv, pixel_mm)
                 if looks.normal_map is not None:
                     frames = self._frames[number]
                     normal[chosen] = looks.bent(frames, normal[chosen], local, barycentric[chosen], uv, pixel_mm)
+        opacity *= there
         if unlit:
-            return color, opacity
-        return shade * _lit(normal @ camera.R.T.astype(np.float32), color, gloss), opacity
+            return color * opacity[:, None], opacity
+        # What is clear, as a cornea, mirrors as much as if it were not; a map's alpha says that nothing is there.
+        local = normal @ camera.R.T.astype(np.float32)
+        return shade * (_matt(local, color) * opacity[:, None] + (_shine(local, gloss) * there)[:, None]), opacity
 
 
 class _Looks:
@@ -178,6 +202,8 @@ class _Looks:
         self.roughness, self.opacity = drawable.roughness, drawable.opacity
         self.texture, self.normal_map = drawable.texture, drawable.normal_map
         self.needs_uv = drawable.uv is not None and (self.texture is not None or self.normal_map is not None)
+        with_alpha = self.needs_uv and self.texture is not None and self.texture.shape[2] == 4
+        self.seen_through = self.opacity < 1.0 or with_alpha
         self._levels = {"texture": [self.texture], "normal_map": [self.normal_map]}
         self._growing = threading.Lock()
         if not self.needs_uv:
@@ -195,10 +221,9 @@ class _Looks:
         return tuple(array.astype(np.float32) for array in corner_tangents(vertices, faces, normals, uv, uv_faces))
 
     def albedo(self, uv, pixel_mm):
-        """Linear colours (k, 3) and opacities (k,)."""
+        """Linear colours (k, 3) and the map's own opacities (k,), 1 where it has none."""
         sample = _bilinear(self._level("texture", pixel_mm), uv) / np.float32(255.0)
-        opacity = sample[:, 3] * self.opacity if sample.shape[1] == 4 else np.float32(self.opacity)
-        return srgb_to_linear(sample[:, :3]), opacity
+        return srgb_to_linear(sample[:, :3]), sample[:, 3] if sample.shape[1] == 4 else np.float32(1.0)
 
     def bent(self, frames, normal, face, barycentric, uv, pixel_mm):
         """Normals (k, 3) turned by the normal map."""
@@ -269,22 +294,25 @@ def _bilinear(image, uv):
     return upper * (1 - fy) + lower * fy
 
 
-def _lit(local, color, roughness):
-    """Linear colours of camera-space normals (k, 3) under the lights: Lambert, and for smooth surfaces the key light's
-    highlight (Blinn-Phong; three lights would put three dots into an eye).
-    """
+def _matt(local, color):
+    """Linear colours of camera-space normals (k, 3) under the lights: Lambert."""
     light = np.full(len(local), AMBIENT, np.float32)
     for x, y, z, strength in LIGHTS:
         light += np.float32(strength) * np.maximum(local @ _unit(x, y, z), 0.0)
-    image = color * light[:, None]
+    return color * light[:, None]
+
+
+def _shine(local, roughness):
+    """(k,) the key light's highlight on smooth surfaces with camera-space normals (k, 3) (Blinn-Phong; three lights
+    would put three dots into an eye)."""
+    result = np.zeros(len(local), np.float32)
     glossy = np.flatnonzero(roughness < 0.5)
     if len(glossy):
         x, y, z, strength = LIGHTS[0]
         power = 2.0 / np.maximum(roughness[glossy], MIN_ROUGHNESS) ** 4 - 2.0
         facing = np.maximum(local[glossy] @ _unit(*(_unit(x, y, z) + [0, 0, 1])), 0.0)
-        shine = strength * 0.04 * (power + 2.0) / 8.0 * facing**power
-        image[glossy] += np.minimum(shine, 2.0)[:, None]
-    return image
+        result[glossy] = np.minimum(strength * 0.04 * (power + 2.0) / 8.0 * facing**power, 2.0)
+    return result
 
 
 def _unit(x, y, z):

@@ -157,8 +157,12 @@ def _material(template, part, maps, options, light):
         return Material(part.material, **plain, albedo=found.get("albedo"), normal=found.get("normal")), {}
     if part.attach.startswith("eye_") and options.eyes is not None and plain["alpha"] == 1.0:
         name = f"{part.name}_albedo"
-        # Through the pupil of a separate iris its own back is seen, from within.
-        plain |= {"color": (1.0, 1.0, 1.0), "double_sided": part.name != part.attach}
+        plain["color"] = (1.0, 1.0, 1.0)
+        if part.name != part.attach:
+            # Through the pupil of a separate iris its own back is seen, from within; the cornea before it shines.
+            plain |= {"double_sided": True, "roughness": 1.0}
+        else:
+            plain["double_sided"] = False
         return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
     behind = [other for other in parts_behind_lips(template) if other.material == part.material]
     if options.painted and ("paint" in look or part in behind):

@@ -8,10 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.mesh.fade import smooth_step
+
 _LASH = (34, 25, 21)
 _SHADOW = (30, 14, 12)
 _HAIRS = {"upper": 120, "lower": 56}
+_BORDER = 0.01  # of the width: a hair on it would wrap round to the other end
 _FADE = 1.25
+_CORNERS = 0.1  # of a row of lashes at either end: there they get shorter and finer,
+_LEAST_LENGTH, _LEAST_WIDTH = 0.35, 0.55  # down to such shares
 
 
 def paint_lashes(look, size=512):
@@ -31,11 +36,16 @@ def _hairs(rng, count, height, width, thickness):
     """(height, width) alpha of hairs that stand on the bottom row; neighbours lean to a common tip now and then."""
     alpha = np.zeros((height, width))
     y = (height - 0.5 - np.arange(height)) / height  # 0 at the root
-    roots = (np.arange(count) + rng.uniform(0.1, 0.9, count)) / count
+    roots = _BORDER + (1.0 - 2.0 * _BORDER) * (np.arange(count) + rng.uniform(0.1, 0.9, count)) / count
     clump = np.repeat(rng.uniform(-0.9, 0.9, count // 3 + 1), 3)[:count] / count
     lean = clump * 1.2 + rng.normal(0, 0.5, count) / count
     length = np.clip(rng.normal(0.82, 0.16, count), 0.35, 0.99)
     radius = thickness * rng.uniform(1.3, 2.3, count) * width / 1024
+    # A row that ended with hairs as long as the others would end in a straight edge beside the corner of the eye.
+    whole = smooth_step(np.minimum(roots, 1.0 - roots), 0.0, _CORNERS)
+    length *= _LEAST_LENGTH + (1.0 - _LEAST_LENGTH) * whole
+    lean *= whole
+    radius *= _LEAST_WIDTH + (1.0 - _LEAST_WIDTH) * whole
     for root, bend, tall, wide in zip(roots, lean, length, radius):
         middle = (root + bend * (1.2 * y + 1.6 * y**2)) * width
         rest = np.maximum(1 - y / tall, 0.0)

@@ -20,6 +20,7 @@ OUTSIDE = 5.0  # times that share counts before the opening, as at a tongue that
 ALL_SEEN = 0.45  # share of half a sphere that the mouth's opening takes where all of the light comes in
 BEHIND_LIPS = ("teeth_", "gums_", "tongue")
 CLAY_MAP_PX = 256
+_LEAST_ALPHA, _CLEAR, _SOLID = 0.05, 0.1, 0.9  # less is not shown; less only shines, as a cornea; clay
 
 
 class Puppet:
@@ -95,8 +96,13 @@ def picture(scene, camera):
 
 
 def shown_meshes(rig, textured):
-    """The meshes of a rig that are seen; clay is not seen through."""
-    return [mesh for mesh in rig.meshes if mesh.material.alpha >= (0.05 if textured else 0.9)]
+    """The meshes of a rig that are seen; clay is not seen through, but for what does no more than shine."""
+    return [
+        mesh
+        for mesh in rig.meshes
+        if mesh.material.alpha >= _LEAST_ALPHA
+        and (textured or mesh.material.alpha >= _SOLID or mesh.material.alpha < _CLEAR)
+    ]
 
 
 def rig_drawables(rig, textured):

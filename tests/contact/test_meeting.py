@@ -80,6 +80,14 @@ def test_lids_that_meet_already_stay(shut):
     assert np.linalg.norm(meeting(met) - met, axis=1).max() < 0.02
 
 
+def test_lids_that_another_shape_moves_keep_farther_from_each_other(shut):
+    _, _, _, meeting, pose, axes = shut
+    n = len(pose) // 2
+    tight, moved = (axes.angles(meeting(pose, moved=moved)) for moved in (False, True))
+    wider = FAR * ((moved - tight)[:n] - (moved - tight)[n:])
+    assert wider.min() > -0.01 and 0.01 < wider.max() < 0.05
+
+
 def test_faults_are_new_crossings_and_folds(shut):
     V, faces, _, meeting, pose, _ = shut
     assert meeting.faults(V) == meeting.faults(meeting(pose)) == 0

@@ -1,7 +1,7 @@
 import numpy as np
 
 from facewright.mesh.raster import Camera
-from facewright.mesh.render import BACKGROUND, linear_to_srgb
+from facewright.mesh.render import BACKGROUND, LIGHTS, linear_to_srgb
 from facewright.mesh.scene import Drawable, Scene
 
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -39,11 +39,29 @@ def test_what_lies_just_behind_a_transparent_strip_is_seen_and_not_what_lies_beh
     np.testing.assert_allclose(image[20, 20], linear_to_srgb(np.array([0.75, 0, 0.25])) * 255, atol=1)
 
 
+def test_a_strip_in_the_same_place_as_the_skin_hides_none_of_it():
+    for shift in (0.0, 0.0005, -0.0005):
+        layers = [square(0, color=BLUE), square(1, color=RED), square(1 + shift, color=RED, opacity=0.25)]
+        image = Scene(layers).render(CAMERA, unlit=True)
+        assert (image[12:28, 12:28] == (255, 0, 0)).all()
+
+
 def test_shade_takes_light_and_gloss_alike():
     looks = {"color": RED, "roughness": 0.2}
     bright, dark = (Scene([square(**looks, shade=np.full(4, share))]).render(CAMERA)[20, 20] for share in (1.0, 0.0))
     assert (bright == Scene([square(**looks)]).render(CAMERA)[20, 20]).all()
     assert bright.max() > 100 and not dark.any()
+
+
+def test_what_is_clear_shines_as_what_is_not_and_what_is_not_there_does_not():
+    def bright(opacity, alpha):
+        key = np.array(LIGHTS[0][:3]) / np.linalg.norm(LIGHTS[0][:3]) + [0, 0, 1]
+        look = {"roughness": 0.2, "normals": np.tile(key / np.linalg.norm(key), (4, 1)), "opacity": opacity}
+        strip = square(1, texture=np.full((2, 2, 4), (0, 0, 0, alpha), np.uint8), uv=UV, uv_faces=FACES, **look)
+        return Scene([square(0, color=(0.0, 0.0, 0.0)), strip]).render(CAMERA)[20, 20].min()
+
+    assert bright(0.05, 255) == bright(1.0, 255) > 200
+    assert bright(0.05, 0) == 0
 
 
 def test_texture_stands_upright_and_its_fourth_channel_is_opacity():

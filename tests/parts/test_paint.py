@@ -27,6 +27,14 @@ def test_a_plain_map_has_the_colour_that_was_asked_for():
     assert image.shape == (8, 8, 3) and (image == [255, 127, 0]).all()
 
 
+def test_lashes_get_shorter_towards_the_corners_and_stay_within_their_map():
+    upper = PAINTERS["lashes"]({}, 256)[:128, :, 3]
+    first, middle, last = (
+        np.flatnonzero((part > 100).any(axis=1)).min() for part in np.split(upper, (16, 496), axis=1)
+    )
+    assert not upper[:, [0, -1]].any() and min(first, last) > middle + 40
+
+
 def test_hairs_thin_out_and_strips_fade():
     lashes = PAINTERS["lashes"]({}, 256)[..., 3].astype(float)
     assert lashes[125].mean() > 2 * lashes[40].mean() and lashes[:3].max() < 60
