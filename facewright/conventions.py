@@ -17,6 +17,7 @@ ARKIT_SHAPES = tuple(
 )
 
 EYE_PAIRS = (("eyeBlink", "eyeLookDown"), ("eyeBlink", "eyeSquint"), ("eyeLookIn", "eyeLookUp"))
+SMILING_EYES = ("eyeSquint", "cheekSquint")
 MOUTH_PAIRS = (
     ("mouthSmile", "jawOpen"),
     ("mouthSmile", "mouthFunnel"),

@@ -143,10 +143,11 @@ class _Eye:
         if squint in names:
             own = deltas[names.index(squint), self.skin]
             found[squint] = {1.0: self._full(self._squint(own))}
+        pressed = found[squint][1.0][self.skin] if squint in names else np.zeros_like(self.V)
         for name, direction in look_shapes(self.side).items():
             if name in names:
                 own = deltas[names.index(name), self.skin]
-                found[name] = {w: self._look(direction, own, w) for w in (HALF, 1.0)}
+                found[name] = {w: self._look(direction, own, w, pressed) for w in (HALF, 1.0)}
         return found
 
     def pressed(self, names, shapes):
@@ -155,29 +156,21 @@ class _Eye:
         return shapes[names.index(squint)][self.skin] if squint in names else np.zeros_like(self.V)
 
     def raised(self, names, shapes, pressed):
-        """(name, (n, 3) delta) of the shapes that bring a lid and the ball together, fit to be played with each other.
+        """(name, (n, 3) delta) of the shapes that raise the skin under the eye, fit to be played with what presses it.
 
-        pressed (n, 3): as above. A cheek is raised, and a nose wrinkled, beside each of what comes before them.
+        pressed (n, 3): as above. Each is cleared beside those before it, with and without a squint and a look down.
         """
-        rest = np.zeros_like(self.V)
-        ahead = down = rest, self.ball
-        for name, direction in look_shapes(self.side).items():
-            if name in names and direction in _PRESSING_LOOKS:
-                ball = self.ball.turned(gaze_rotation(direction, self.side))
-                delta = self._cleared(shapes[names.index(name)], [(pressed, ball)])
-                if direction == "Down":
-                    down = delta[self.skin], ball
-                yield name, delta
+        rest, down = np.zeros_like(self.V), next(n for n, where in look_shapes(self.side).items() if where == "Down")
+        looks = [(rest, self.ball)]
+        if down in names:
+            looks.append((shapes[names.index(down)][self.skin], self.ball.turned(gaze_rotation("Down", self.side))))
         raised = rest
         for name in (f"{shape}{self.side.capitalize()}" for shape in _RAISING):
-            if name not in names:
-                continue
-            with_others = [
-                (raised + squints + look, ball) for squints in (rest, pressed) for look, ball in (ahead, down)
-            ]
-            delta = self._cleared(shapes[names.index(name)], [ahead, *with_others[1:]])
-            raised = raised + delta[self.skin]
-            yield name, delta
+            if name in names:
+                beside = [(raised + squint + look, ball) for squint in (rest, pressed) for look, ball in looks]
+                delta = self._cleared(shapes[names.index(name)], [looks[0], *beside[1:]])
+                raised = raised + delta[self.skin]
+                yield name, delta
 
     def _cleared(self, delta, beside):
         """A shape's (n, 3) delta with lids clear of a ball, and their lining behind them, beside each of some motions
@@ -261,7 +254,7 @@ class _Eye:
         turns = [turn * smooth_step(from_ends(self.V[c], _CORNER_MM)) for turn, c in ((turn_u, upper), (turn_l, lower))]
         return self.lids.settled(self.lids.turned(pose, *turns, slides=self.lids.spacing(pose)))
 
-    def _look(self, direction, own, weight):
+    def _look(self, direction, own, weight, pressed):
         R = gaze_rotation(direction, self.side, weight)
         turns = self.options.look_turn_deg[direction]
         pose = self.V if any(turns) else self.V + weight * own
@@ -270,7 +263,7 @@ class _Eye:
         for part in eye_parts(self.face.template, self.side):
             offset = self.face.vertices[part.vertex_slice] - self.ball.center
             full[part.vertex_slice] = offset @ R.T - offset
-        return full
+        return self._cleared(full, [(pressed, ball)]) if direction in _PRESSING_LOOKS else full
 
     def _by_degrees(self, pose, degrees, weight, ball):
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))

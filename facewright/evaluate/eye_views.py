@@ -46,8 +46,11 @@ class EyeView:
             most = max(most, int((hits.face >= len(self.faces)).sum()))
         return most * MM_PER_PX**2
 
-    def through_lids_mm2(self, skin, balls, views=SKIN_VIEWS):
-        """Largest area where the ball stands before the lid skin that should hide it, from one of the views, mm2."""
+    def through_lids_mm2(self, skin, balls, views=SKIN_VIEWS, lining=False):
+        """Largest area where the ball stands before the lid skin that should hide it, from one of the views, mm2.
+
+        lining: or the lining of the lids does
+        """
         lid_faces = self.faces[self.lid]
         scene = RayScene(np.vstack([skin, *balls]), np.concatenate([self.faces, *self.ball_faces]))
         lids, normals = RayScene(skin, lid_faces), face_normals(skin, lid_faces)
@@ -56,6 +59,9 @@ class EyeView:
             origins, directions = self._rays(view)
             hits = scene.cast(origins, directions)
             seen = hits.face >= len(self.faces)
+            if lining:
+                skin_seen = np.flatnonzero((hits.face >= 0) & ~seen)
+                seen[skin_seen] = ~self.lid[hits.face[skin_seen]]
             if not seen.any():
                 continue
             reach = hits.distance[seen, None] + _EPSILON_MM

@@ -20,6 +20,7 @@ DEPTH_BAR_MM, GAP_BAR_MM = 0.2, 0.3
 KINK_BAR_DEG, TURN_BAR_DEG = 20.0, 0.5
 SWELL_BAR, PLAIN_SWELL_BAR = 0.01, 0.04
 SEEN_BAR_MM2 = 0.05  # one pixel of the views
+INSIDE_BAR_MM2 = 1.0  # where cheek and lid meet in a crease a few pixels look behind it
 
 
 def eye_poses():
@@ -27,7 +28,20 @@ def eye_poses():
     poses = {f"eyeBlink {weight:g}": {"eyeBlink": weight} for weight in BLINKS}
     poses |= {f"eyeBlink + {other}": {"eyeBlink": 1.0, other: 1.0} for other in ("eyeLookDown", "eyeSquint")}
     poses |= {name: {name: 1.0} for name in (*LOOKS, "eyeWide", "eyeSquint")}
-    return poses | diagonal_looks()
+    return poses | diagonal_looks() | pressing_poses()
+
+
+def pressing_poses():
+    """name -> weights of shapes that press the skin under the eye to the ball: smiles, disgust, looks down."""
+    pressing = [
+        ("eyeSquint", "cheekSquint"),
+        ("eyeSquint", "noseSneer"),
+        ("eyeSquint", "cheekSquint", "noseSneer"),
+        ("eyeLookDown", "eyeSquint"),
+        ("eyeLookDown", "cheekSquint"),
+        ("eyeLookDown", "eyeSquint", "cheekSquint"),
+    ]
+    return {" + ".join(names): dict.fromkeys(names, 1.0) for names in pressing}
 
 
 def diagonal_looks():
@@ -46,6 +60,7 @@ def measure_eyes(rig, views=True):
     kink_deg   sharpest bend of a closed margin beyond the neutral's own
     visible_mm2  largest area of the ball seen at eyeBlink 1 from the front, 30 degrees to each side and 30 below
     through_mm2  weight of eyeBlink -> largest area of the ball seen through lid skin, from the front and both sides
+    inside_mm2   name -> the same for each of pressing_poses, and of the lining of lids, beyond what the neutral shows
     turn_deg   look shape -> angle that the ball turns at 1
     swell, swell_diagonal  share by which the ball's radius changes on the way of the looks, and of the diagonal ones
     Figures of poses are pairs: (with in-betweens and correctives, plain). Without views nothing is looked at.
@@ -85,6 +100,10 @@ def _measure_lids(rig, sides, players, views):
         result["through_mm2"] = {
             weight: _worst(players, eyes, lambda eye, play, w=weight: eye.seen_through_lids(play, {"eyeBlink": w}))
             for weight in BLINKS
+        }
+        result["inside_mm2"] = {
+            name: _worst(players, eyes, lambda eye, play, w=weights: eye.inside_seen(play, w))
+            for name, weights in pressing_poses().items()
         }
     return result
 
@@ -131,6 +150,9 @@ def _lid_rows(found):
     rows.append(Row("eyes", "eyeBlink 1", "ball seen mm2", *found["visible_mm2"], bar=bar))
     for weight, pair in found["through_mm2"].items():
         rows.append(Row("eyes", f"eyeBlink {weight:g}", "ball through lids mm2", *pair, bar=bar, plain_bar=bar))
+    bar = (None, INSIDE_BAR_MM2)
+    for pose, pair in found["inside_mm2"].items():
+        rows.append(Row("eyes", pose, "ball or lining through lids mm2", *pair, bar=bar, plain_bar=bar))
     return rows
 
 
@@ -254,6 +276,11 @@ class _Eye(_Ball):
 
     def seen_through_lids(self, play, weights):
         return self.view.through_lids_mm2(*self._pose(play, weights))
+
+    def inside_seen(self, play, weights):
+        """mm2 of the ball and of the lining of lids seen through their skin, beyond what the neutral shows of them."""
+        posed, rest = (self.view.through_lids_mm2(*self._pose(play, w), lining=True) for w in (weights, {}))
+        return max(posed - rest, 0.0)
 
     def _pose(self, play, weights):
         weights = self.sided(weights)

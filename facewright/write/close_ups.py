@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, SMILING_EYES, TONGUE_PAIR
 from facewright.evaluate.play import both_sides
 from facewright.evaluate.shapes import shape_names, with_base
 from facewright.mesh.raster import Camera
@@ -22,7 +22,8 @@ def close_up_poses(rig):
     names = shape_names(rig)
     one_name = dict.fromkeys(_without_side(name, names) for name in names)
     poses = {name: with_base(name, names) for name in one_name}
-    poses |= {" + ".join(pair): dict.fromkeys(pair, 1.0) for pair in (*EYE_PAIRS, *MOUTH_PAIRS, TONGUE_PAIR)}
+    pairs = (*EYE_PAIRS, SMILING_EYES, *MOUTH_PAIRS, TONGUE_PAIR)
+    poses |= {" + ".join(pair): dict.fromkeys(pair, 1.0) for pair in pairs}
     poses = {label: both_sides(weights, names) for label, weights in poses.items()}
     sorted_out = {}, {}, {}
     for label, weights in poses.items():

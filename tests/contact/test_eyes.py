@@ -7,7 +7,7 @@ import pytest
 
 from facewright.contact import EyeShapes, Targets, solve_eyes
 from facewright.contact.gaze import gaze_rotation
-from facewright.evaluate.eyes import margin_gap_mm
+from facewright.evaluate.eyes import margin_gap_mm, pressing_poses
 from facewright.expand import expand_weights
 from facewright.parts import fit_parts
 from facewright.transfer import transfer_shapes
@@ -106,3 +106,16 @@ def test_pairs_are_made_of_the_shapes_as_they_are(solved):
     pair = {"eyeBlinkLeft": 1.0, "eyeSquintLeft": 1.0}
     change = (after.motion(pair) - before.motion(pair))[face.lines["lid_upper_left"]]
     assert np.abs(np.median(change, axis=0) - [0.0, 0.0, 0.02]).max() < 0.01
+
+
+@pytest.mark.parametrize("names", list(pressing_poses()))
+def test_shapes_that_press_the_lid_to_the_ball_add_up_before_it(solved, names):
+    for face, eyes in solved:
+        rest = carried_eyeball(face.template, face.vertices, "left")
+        down = "eyeLookDown" in pressing_poses()[names]
+        ball = rest.turned(gaze_rotation("Down", "left")) if down else rest
+        plain = dict(zip(face.template.shape_names, eyes.deltas))
+        for weight in (0.5, 1.0):
+            pose = face.vertices + sum(weight * plain[f"{name}Left"] for name in pressing_poses()[names])
+            if weight == 1.0 or not down:
+                assert ball.gap(pose[outer_lid(face, "left")]).min() > -0.05
