@@ -58,7 +58,6 @@ class MouthOptions:
     """lips, close  how lips meet, how mouthClose is made
     flat_mm      from the seam: skin that may give way where a shape folds it
     window_mm    width over the midline over which left hands over to right
-    tongue_share of what a tongue that is out adds to an open jaw that is taken back; all of it would shut lips on it
     tongue_half  shares of its whole way by which the mouth is parted and the tongue has come at half: first it opens
     once         shapes that draw the same muscle together: of the last only a share of 1 - once_share comes on top
     halves       shapes that get an in-between at half: lips rolled in, which pass round the teeth, and a lip that a jaw
@@ -71,7 +70,6 @@ class MouthOptions:
     lips: LipOptions = field(default_factory=LipOptions)
     close: MouthCloseOptions = field(default_factory=MouthCloseOptions)
     flat_mm: float = 12.0
-    tongue_share: float = 0.5
     tongue_half: tuple[float, float] = (0.85, 0.35)
     once: tuple[str, ...] = ("mouthFunnel", "mouthPucker")
     once_share: float = 0.6
@@ -260,8 +258,9 @@ class _Mouth:
     def with_tongue(self, targets):
         """Targets with a corrective for a tongue that comes out of an open mouth, and an in-between for its way.
 
-        It parts the teeth by itself, and both together would open the jaw farther than it goes. By itself, with the jaw
-        and half way it lies on the lower lip.
+        It parts the teeth by itself, and both together would open the jaw farther than it goes, where the throat folds
+        into itself: what it adds to a jaw that is open is taken back. By itself, with the jaw and half way it lies on
+        the lower lip.
         """
         parts = {part.name: part.vertex_slice for part in self.face.template.parts}
         if not {"teeth_lower", "tongue"} <= set(parts) or not {"jawOpen", "tongueOut"} <= set(targets.names):
@@ -279,7 +278,7 @@ class _Mouth:
         deltas[targets.names.index("tongueOut")] = out
         drivers = ("jawOpen", "tongueOut")
         name = corrective_name(drivers)
-        back = -self.options.tongue_share * share * opened
+        back = -share * opened
         made = replace(
             targets,
             deltas=deltas,

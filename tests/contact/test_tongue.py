@@ -76,3 +76,6 @@ def test_a_tongue_that_is_out_lies_on_the_lip_by_itself_too(hm08_person):
         assert mouth.tongue_in_flesh_mm() < 0.5 and mouth.tongue_out_mm() > 5.0
         mouth = _Mouth(after, {"tongueOut": 0.5, "jawOpen": weight}, True)
         assert mouth.tongue_in_flesh_mm() < 0.5
+    teeth = face.template.part("teeth_lower").vertex_slice
+    opened, both = (solved.motion(dict.fromkeys(pose, 1.0))[teeth] for pose in (names[:1], names))
+    assert np.linalg.norm(both - opened, axis=1).max() < 0.02 * np.linalg.norm(opened, axis=1).max()
