@@ -104,6 +104,7 @@ class LipContact:
         self.lips = self.used[self._both]
         # Outer skin may not come to lie in the teeth either: what does is cheek or chin that a tooth would pierce.
         self._guarded = np.union1d(self._both, np.flatnonzero(outer[self.used]))
+        self._hidden = ~outer[self.used[self._guarded]]
         rest = np.ascontiguousarray(vertices[self.used])
         tied = cKDTree(vertices[seam]).query(rest)[0] < self.options.tied_mm
         ties = self._ties(rest, outer[self.used], tied)
@@ -148,7 +149,7 @@ class LipContact:
     def _where_it_acts_most(self, weights, acts):
         return max(weights or self.options.weights, key=acts or (lambda weight: weight))
 
-    def apart(self, motion, weights=None, acts=None, closed=False, shut=False):
+    def apart(self, motion, weights=None, acts=None, closed=False, shut=False, spared_mm=0.0):
         """(n, 3) correction of a motion so that lips stay off each other and off the teeth along it.
 
         motion   function of a weight: displacement (n, 3) of the head from the neutral
@@ -156,6 +157,7 @@ class LipContact:
         weights  at which contact is solved; default: options.weights
         closed   the lips shall meet: pairs of the seam stay together while the rest moves apart, locally
         shut     no slit shall open between them where they give way
+        spared_mm how deep in a tooth skin may lie that nobody sees, but where the correction acts most
 
         The way is walked: each round asks one weight more, from where the correction acts least. Asked at its end at
         once, lips that have gone 3 mm through each other part to the wrong side here and there.
@@ -174,7 +176,8 @@ class LipContact:
                 share = acts(weight) if acts else weight
                 skin = poses[weight][self.used] + share * field
                 last = watches.get(weight, last)
-                wishes, heeded, last = self._wishes(skin, poses[weight], last)
+                spared = 0.0 if weight == most_weight else spared_mm
+                wishes, heeded, last = self._wishes(skin, poses[weight], last, spared)
                 watches[weight], solved[weight] = last, field
                 left[weight] = max(lengths(wishes).max(initial=0.0), self.options.touch_mm)
                 if closed:
@@ -238,9 +241,10 @@ class LipContact:
         result[self.used] = np.where(max_norms(field)[:, None] < _NOTHING_MM, 0.0, field)
         return result
 
-    def _wishes(self, skin, pose, watches):
+    def _wishes(self, skin, pose, watches, spared_mm=0.0):
         """Wishes (k, 3) that undo the contact of the skin around the lips (k, 3), teeth in a pose (n, 3) of the head,
-        (k,) in 0..1 who wishes, and the _Watches for the next pose; watches: those of an earlier one."""
+        (k,) in 0..1 who wishes, and the _Watches for the next pose; watches: those of an earlier one; spared_mm: deeper
+        than else hidden skin may lie in teeth."""
         skin = np.ascontiguousarray(skin)
         wishes, counts, lips = self._lip_wishes(skin, watches.lips)
         guarded, teeth = skin[self._guarded], []
@@ -249,7 +253,7 @@ class LipContact:
             due = watch.due()
             way, clearance = row.way_out(guarded[due], pose[at])
             teeth.append(watch.answered(due, clearance))
-            depth, allowed = lengths(way), allowed[due]
+            depth, allowed = lengths(way), (allowed + spared_mm * self._hidden)[due]
             hit = depth > allowed + self.options.touch_mm
             farther = (depth - allowed)[hit] + self.options.off_mm
             wishes[self._guarded[due[hit]]] = way[hit] * (farther / depth[hit])[:, None]

@@ -65,6 +65,8 @@ class MouthOptions:
     rolls        shapes that take lips in; pressed: share of itself by which one goes on from where outer skin meets the
                  teeth
     pairs        shapes, or both sides of them, that get a corrective together
+    spared_mm    how deep the inside of a lip may lie in a tooth half way to such a pair: there its corrective acts by a
+                 quarter, and what would push it out does four times as much in the end, where it crumples the corner
     """
 
     lips: LipOptions = field(default_factory=LipOptions)
@@ -78,6 +80,7 @@ class MouthOptions:
     rolls: tuple[str, ...] = ("mouthRollLower", "mouthRollUpper")
     pressed: float = 0.5
     pairs: tuple[tuple[str, str], ...] = PAIRS
+    spared_mm: float = 1.0
 
 
 def part_lips(face, options=None):
@@ -213,7 +216,10 @@ class _Mouth:
         pairs = [[_sides(name, targets.names) for name in pair] for pair in self.options.pairs]
         pairs = [sides for sides in pairs if all(sides)]
         lacks = self._each(
-            lambda sides: self._lack(targets, _together(sides), weights=(1.0, HALF), acts=_square), pairs
+            lambda sides: self._lack(
+                targets, _together(sides), weights=(1.0, HALF), acts=_square, spared_mm=self.options.spared_mm
+            ),
+            pairs,
         )
         for sides, lack in zip(pairs, lacks):
             for drivers, share in self._shared(sides):
@@ -337,8 +343,8 @@ class _Mouth:
         result[self.skin] = field
         return result
 
-    def _lack(self, targets, pose, weights=None, acts=None, closed=False):
-        """(n, 3) what a pose lacks along its way; weights, acts, closed as LipContact.apart takes them."""
+    def _lack(self, targets, pose, weights=None, acts=None, closed=False, spared_mm=0.0):
+        """(n, 3) what a pose lacks along its way; weights, acts, closed, spared_mm as LipContact.apart takes them."""
         act = acts or (lambda weight: weight)
         first = self._too_much(targets, pose)
 
@@ -348,14 +354,14 @@ class _Mouth:
         shut, twice = _stays_shut(pose)
         if shut:
             first = first + self.contact.shut(motion, weights, acts, lifted=twice)
-        first = first + self.contact.apart(motion, weights, acts, closed, shut)
+        first = first + self.contact.apart(motion, weights, acts, closed, shut, spared_mm)
         # Lips that two shapes have taken far through each other part with a slit; from there it is a short way to shut.
         best, least = first, self.contact.ajar(motion, weights, acts) if twice else 0.0
         for _ in range(_AGAIN):
             if not least:
                 break
             first = first + self.contact.shut(motion, weights, acts, lifted=True)
-            first = first + self.contact.apart(motion, weights, acts, closed, shut)
+            first = first + self.contact.apart(motion, weights, acts, closed, shut, spared_mm)
             left = self.contact.ajar(motion, weights, acts)
             if left < least:
                 best, least = first, left

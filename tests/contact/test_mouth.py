@@ -168,3 +168,17 @@ def test_two_rolls_stay_shut(solved):
     contact = _Mouth(person, MouthOptions()).contact
     pose = (person.vertices + targets.motion(dict.fromkeys(names, 1.0)))[contact.used]
     assert max(gaps.max() for gaps in contact.slit.gaps(pose)) < 0.3
+
+
+def test_the_inside_of_a_lip_may_lie_in_teeth_on_the_way_but_not_in_the_end(solved):
+    person, _, _ = solved
+    contact = _Mouth(person, MouthOptions()).contact
+    back, still = np.zeros((2, *person.vertices.shape))
+    back[contact.lips[~person.regions["outer"][contact.lips]], 2] = -3.0
+
+    def push(end, spared_mm):
+        path = {0.5: back, 1.0: end}
+        return np.abs(contact.apart(path.get, tuple(path), lambda weight: weight**2, spared_mm=spared_mm)).max()
+
+    assert push(still, 0.0) > 1.0 and push(still, 5.0) == 0.0
+    assert 0.0 < push(back, 5.0) < 0.5 * push(back, 0.0)
