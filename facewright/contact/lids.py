@@ -33,6 +33,8 @@ _FAR_MM = 2.0
 _LAP_MM, _LAP_ENDS_MM = 0.12, 6.0  # by which the upper margin lies before the lower one when they are shut
 _WAVES = 2  # of the closing line between the canthi
 _RADIUS_ROUNDS = 8
+# Left between two lids of a blink, which must be tight (if there are faults, the next); of lids that a shape moves.
+_SHUT_GAPS_MM, _MOVED_GAP_MM = (0.015, 0.02, 0.03), 0.03
 _AS_ONE_MM, _ALONE_MM = 2.5, 12.0  # from the closing line: shut lids go as one with another shape, and not at all
 
 
@@ -192,16 +194,16 @@ class Lids:
         result[inside] = factor.solve(-(rest @ field[~inside]))
         return result
 
-    def settled(self, pose, ball=None, shut=False, moved=False):
+    def settled(self, pose, ball=None, gap_mm=None):
         """The pose (n, 3) without folded faces: where the corners press skin together it gives way, but not into the
-        ball, nor, where the lids are shut, into the other lid; moved as in Meeting."""
+        ball, nor, where the lids are shut, into the other lid, gap_mm off it."""
         for _ in range(_SETTLINGS):
             flat = laid_flat(self.V, pose, self._near_faces, self._ease)
             if flat is pose:
                 break
             pose = self.lifted(flat, ball)
-            if shut:
-                pose = self._met(pose, unfolded=True, moved=moved)
+            if gap_mm is not None:
+                pose = self._met(pose, gap_mm, unfolded=True)
         return pose
 
     def lifted(self, pose, ball=None, passing_mm=0.0):
@@ -248,7 +250,9 @@ class Lids:
         pose = self.lifted(pose + np.stack(spread, axis=1), ball)
         # Round a corner some rims pass through others when their margins carry them, some when these do not.
         joined = self._soundest(
-            self.settled(self._met(self._firm(pose, corners)), ball, shut=True) for corners in (True, False)
+            self.settled(self._met(self._firm(pose, corners), gap), ball, gap)
+            for gap in _SHUT_GAPS_MM
+            for corners in (True, False)
         )
         return self._met.sealed(joined)
 
@@ -288,8 +292,8 @@ class Lids:
         outward = result - ball.center
         result += share * np.mean(rises, axis=0)[:, None] * normalized(outward)
         result = self.lifted(result + (1.0 - share) * motion, ball)
-        ways = (lambda: result, lambda: self._met(result, unfolded=True, moved=True))
-        return self._soundest(self.settled(way(), ball, shut=True, moved=True) for way in ways)
+        ways = (lambda: result, lambda: self._met(result, _MOVED_GAP_MM, unfolded=True))
+        return self._soundest(self.settled(way(), ball, _MOVED_GAP_MM) for way in ways)
 
     def turn_of(self, shut, motion):
         """(l,) radians at the lower margin by which a motion (n, 3) turns shut lids (n, 3): half way between both."""

@@ -22,8 +22,7 @@ from facewright.mesh.overlap import barycentric, where_edges_pass
 from facewright.mesh.seam import seam_sides
 
 _REACH_MM, _LINING_MM = 8.0, 3.0  # over the skin and over the lining from the margins: what the other lid may meet
-# Left between two lids: of a blink alone, which must be tight, of lids that another shape moves, and beside margins.
-_GAP_MM, _MOVED_GAP_MM, _MARGIN_GAP_MM = 0.015, 0.03, 0.01
+_MARGIN_GAP_MM = 0.01  # left between two lids beside their margins, at most
 _OVER_MM, _OVER_ENDS_MM = 0.06, 3.0  # by which the upper margin passes the lower one, that far from the canthi
 _NEAR_MM, _DEEPEST_MM = 0.5, 4.0  # lids nearer than this over a place may come to meet there; deeper is no contact
 _MARGIN_EASE = 0.004  # how readily a margin gives way; the rest: 1
@@ -92,12 +91,12 @@ class Meeting:
         self._laplacian = _laplacian(self._rest, self._faces)
         self._before = None
 
-    def __call__(self, pose, unfolded=False, moved=False):
+    def __call__(self, pose, gap_mm, unfolded=False):
         """The pose (n, 3) of shut lids with each lid on its side of the other one, turned as little as that takes.
 
-        unfolded  the pose has no folded faces, and shall have none; moved: another shape moves the shut lids
+        gap_mm  left between them; unfolded: the pose has no folded faces, and shall have none
         """
-        gap = np.minimum(_MOVED_GAP_MM if moved else _GAP_MM, self._beside)
+        gap = np.minimum(gap_mm, self._beside)
         points = pose[self._used]
         along, radius, angle = self.axes.cylindrical(points)
         place, height = np.stack([along, radius], axis=1), self._far * angle
