@@ -353,6 +353,7 @@ class _Mouth:
 
         shut, twice = _stays_shut(pose)
         if shut:
+            spared_mm = 0.0  # lips that are rolled in lie at the teeth
             first = first + self.contact.shut(motion, weights, acts, lifted=twice)
         first = first + self.contact.apart(motion, weights, acts, closed, shut, spared_mm)
         # Lips that two shapes have taken far through each other part with a slit; from there it is a short way to shut.
