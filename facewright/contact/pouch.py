@@ -12,8 +12,9 @@ import numpy as np
 
 from facewright.mesh.raster import RayScene
 
-BEHIND_MM, FROM_MM = 0.25, 4.0
-"""How far behind the skin, and from which distance off the margins on: there lining and skin are one."""
+BEHIND_MM, FROM_MM, FREE_MM = 0.25, 4.0, 2.0
+"""How far behind the skin, from which distance off the margins on, and from where on lining gives way as it must: at the
+margins it and the skin are one."""
 _ROUNDS = 3
 _DONE_MM = 1e-3
 
@@ -29,6 +30,7 @@ class LidLining:
         self._skin_faces, self._lining_faces, self._center = skin_faces, lining_faces, center
         self._skin, self._gives = np.unique(skin_faces), np.flatnonzero(gives)
         self._behind = BEHIND_MM * np.minimum(distance / FROM_MM, 1.0)
+        self._gives_by = np.minimum(distance[self._gives] / FREE_MM, 1.0)
 
     def kept_behind(self, pose):
         """The pose (n, 3) with its lining behind its skin, as seen from the centre of the ball."""
@@ -42,7 +44,7 @@ class LidLining:
             np.maximum.at(need, self._lining_faces[hit[met]], short[:, None])
             hit, above = self._above(pose, self._skin_faces, self._gives)
             short = np.where(hit >= 0, self._behind[self._gives] - above, 0.0)
-            need = np.maximum(need[self._gives], short)
+            need = self._gives_by * np.maximum(need[self._gives], short)
             if need.max(initial=0.0) < _DONE_MM:
                 break
             offset = pose[self._gives] - self._center
