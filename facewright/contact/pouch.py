@@ -13,8 +13,8 @@ import numpy as np
 from facewright.mesh.raster import RayScene
 
 BEHIND_MM, FROM_MM, FREE_MM = 0.25, 4.0, 2.0
-"""How far behind the skin, from which distance off the margins on, and from where on lining gives way as it must: at the
-margins it and the skin are one."""
+"""How far behind the skin, from which distance off the margins on, and from where on lining gives way as it must:
+at the margins it and the skin are one."""
 _ROUNDS = 3
 _DONE_MM = 1e-3
 
