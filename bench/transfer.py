@@ -77,8 +77,13 @@ def measure_exactness(template):
     source, target, deltas = template.vertices[:skin], face.vertices[:skin], template.deltas[:, :skin]
     own = DeformationTransfer(source, target, **system).transfer(deltas)
     turned = DeformationTransfer(source @ R.T + shift, target, **system).transfer(deltas @ R.T)
+    # What rides on the lids is made anew from the skin, whose stored deltas are rounded.
+    riding = np.zeros(len(template.vertices), bool)
+    for part in template.parts:
+        riding[part.vertex_slice] = part.attach.startswith("lid_")
+    off = np.abs(transfer_shapes(person(template, 0)) - template.deltas)
     result = {
-        "onto itself": np.abs(transfer_shapes(person(template, 0)) - template.deltas).max(),
+        "onto itself": off[:, ~riding].max(),
         "rigid motion of the target": np.abs(moved - shapes @ R.T).max(),
         "rigid motion of the source": np.abs(turned - own).max(),
     }
