@@ -127,7 +127,7 @@ class _Eye:
         self.lid_faces = faces[(free & ~socket)[faces].all(axis=1)]
         near = distance < options.free_mm
         lining = faces[(socket[faces] & near[faces]).any(axis=1)]
-        self.lining = LidLining(self.lid_faces, lining, distance, socket & near, self.ball.center)
+        self.lining = LidLining(self.V, self.lid_faces, lining, distance, socket & near, self.ball.center)
         self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
 
     def shapes(self, names, deltas):

@@ -22,14 +22,17 @@ _DONE_MM = 1e-3
 class LidLining:
     """The lining behind the lids of one eye.
 
-    skin_faces, lining_faces (m, 3), (l, 3) of the head's skin; distance (n,) mm from the margins; gives (n,) bool: the
-    lining that may give way, into the ball if need be; center (3,) of the ball
+    rest (n, 3) mm: the skin at rest, of which no more is asked than it has; skin_faces, lining_faces (m, 3), (l, 3)
+    distance (n,) mm from the margins; center (3,) of the ball
+    gives (n,) bool: lining that may give way, into the ball if need be
     """
 
-    def __init__(self, skin_faces, lining_faces, distance, gives, center):
+    def __init__(self, rest, skin_faces, lining_faces, distance, gives, center):
         self._skin_faces, self._lining_faces, self._center = skin_faces, lining_faces, center
         self._skin, self._gives = np.unique(skin_faces), np.flatnonzero(gives)
-        self._behind = BEHIND_MM * np.minimum(distance / FROM_MM, 1.0)
+        behind = BEHIND_MM * np.minimum(distance / FROM_MM, 1.0)
+        self._under_skin = np.clip(-self._above(rest, lining_faces, self._skin)[1], 0.0, behind[self._skin])
+        self._room = np.clip(self._above(rest, skin_faces, self._gives)[1], 0.0, behind[self._gives])
         self._gives_by = np.minimum(distance[self._gives] / FREE_MM, 1.0)
 
     def kept_behind(self, pose):
@@ -40,10 +43,10 @@ class LidLining:
             # Skin may dip in between the lining's vertices, which are few.
             hit, above = self._above(pose, self._lining_faces, self._skin)
             met = hit >= 0
-            short = np.maximum(above[met] + self._behind[self._skin[met]], 0.0)
+            short = np.maximum(above[met] + self._under_skin[met], 0.0)
             np.maximum.at(need, self._lining_faces[hit[met]], short[:, None])
             hit, above = self._above(pose, self._skin_faces, self._gives)
-            short = np.where(hit >= 0, self._behind[self._gives] - above, 0.0)
+            short = np.where(hit >= 0, self._room - above, 0.0)
             need = self._gives_by * np.maximum(need[self._gives], short)
             if need.max(initial=0.0) < _DONE_MM:
                 break

@@ -26,7 +26,8 @@ def lid():
     lining, lining_faces = patch(13.0, len(skin))
     gives = np.arange(2 * len(skin)) >= len(skin)
     distance = np.full(2 * len(skin), 2 * FROM_MM)
-    return np.vstack([skin, lining]), gives, LidLining(skin_faces, lining_faces, distance, gives, CENTER)
+    vertices = np.vstack([skin, lining])
+    return vertices, gives, LidLining(vertices, skin_faces, lining_faces, distance, gives, CENTER)
 
 
 def test_a_lining_that_lies_behind_stays(lid):
@@ -49,7 +50,7 @@ def test_it_gives_way_to_skin_that_is_pressed_in(lid, pressed):
 
 def test_at_the_margins_lining_and_skin_are_one(lid):
     vertices, gives, lining = lid
-    at_margin = LidLining(lining._skin_faces, lining._lining_faces, np.zeros(len(vertices)), gives, CENTER)
+    at_margin = LidLining(vertices, lining._skin_faces, lining._lining_faces, np.zeros(len(vertices)), gives, CENTER)
     pose = vertices.copy()
     pose[gives] = CENTER + (vertices[gives] - CENTER) * (13.99 / 13.0)
     assert np.array_equal(at_margin.kept_behind(pose), pose)
