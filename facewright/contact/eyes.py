@@ -71,12 +71,13 @@ class EyeShapes:
         names, result = self._names, np.array(deltas)
         extras, in_betweens, correctives = {}, {}, {}
         for eye in self._eyes:
-            for name, poses in eye.shapes(names, deltas).items():
+            found = eye.shapes(names, deltas)
+            pressed = eye.pressed(found)
+            for name, poses in found.items():
                 result[names.index(name)] = poses.pop(1.0)
                 if poses:
                     in_betweens[name] = {weight: in_between_name(name, weight) for weight in poses}
                     extras |= {in_betweens[name][weight]: delta for weight, delta in poses.items()}
-            pressed = eye.pressed(names, result)
             for name, cleared in eye.raised(names, result, pressed):
                 result[names.index(name)] = cleared
             for pair in eye.diagonals(names):
@@ -143,17 +144,17 @@ class _Eye:
         if squint in names:
             own = deltas[names.index(squint), self.skin]
             found[squint] = {1.0: self._full(self._squint(own))}
-        pressed = found[squint][1.0][self.skin] if squint in names else np.zeros_like(self.V)
+        pressed = self.pressed(found)
         for name, direction in look_shapes(self.side).items():
             if name in names:
                 own = deltas[names.index(name), self.skin]
                 found[name] = {w: self._look(direction, own, w, pressed) for w in (HALF, 1.0)}
         return found
 
-    def pressed(self, names, shapes):
-        """(n, 3) motion of the skin under the squint of shapes (s, n, 3), beside which others must clear the ball."""
-        squint = f"eyeSquint{self.side.capitalize()}"
-        return shapes[names.index(squint)][self.skin] if squint in names else np.zeros_like(self.V)
+    def pressed(self, found):
+        """(n, 3) motion of the skin in a squint, beside which others must clear the ball; found: as shapes returns."""
+        squint = found.get(f"eyeSquint{self.side.capitalize()}")
+        return squint[1.0][self.skin] if squint else np.zeros_like(self.V)
 
     def raised(self, names, shapes, pressed):
         """(name, (n, 3) delta) of the shapes that raise the skin under the eye, fit to be played with what presses it.
@@ -168,6 +169,7 @@ class _Eye:
         for name in (f"{shape}{self.side.capitalize()}" for shape in _RAISING):
             if name in names:
                 beside = [(raised + squint + look, ball) for squint in (rest, pressed) for look, ball in looks]
+                # By itself first; beside what is raised alone it is clear if it is so with a squint besides.
                 delta = self._cleared(shapes[names.index(name)], [looks[0], *beside[1:]])
                 raised = raised + delta[self.skin]
                 yield name, delta
