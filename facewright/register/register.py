@@ -54,6 +54,8 @@ class RegisterOptions:
 # levels from 45 down to 5 took 1.5 core seconds more, and lips of hm08 were 0.58 mm off instead of 0.57.
 LEVELS = ((10.0, 5.0, 3.0, 10.0),)
 DETAIL = ((2.0, 0.5, 1.5, 4.0),)
+# The model may miss the back of a bald head by 10 mm, for it only knows the face.
+BALD = ((10.0, 5.0, 15.0, 30.0),)
 # Facets are no detail: the last level draws the skin of a scan cut to 3,000 triangles (edges of 11 mm) 0.03 mm farther
 # from the full one's, and what it is drawn to is the smoothed scan. A scan with edges of 4.6 mm needs that level: its
 # lip seam is 0.9 mm off without, 0.5 with.
@@ -91,7 +93,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     hidden = _hidden_ears(template, target, model.vertices)[:stop]
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
     surface, levels = (target, LEVELS + DETAIL) if finely else (smooth, LEVELS)
-    skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, levels)
+    skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, BALD * bald + levels)
     skin = facing_the_scan(template, skin, faces, matches, "lips")
     fit = model.vertices.copy()
     fit[:stop] = without_knots(template, facing_the_scan(template, skin, faces, matches, "eyes"), faces)

@@ -98,7 +98,8 @@ def without_hair(rules, template, vertices, target):
     """(SkinRules, bald): the scalp's data are believed only on a head whose scalp is as smooth as its skin.
 
     Hair lies close to the head and a few millimetres over it: where it is combed no vertex of it looks wrong by itself,
-    and a scalp that follows it drags the forehead up by 5 mm. vertices (n, 3): the model fitted to the face.
+    and a scalp that follows it drags the forehead up by 5 mm. A bald one is believed however far it lies from the
+    model, which a face says little about. vertices (n, 3): the model fitted to the face.
     """
     stop = template.skin.vertices[1]
     scalp = template.regions["scalp"][:stop] & template.regions["outer"][:stop]
@@ -106,7 +107,10 @@ def without_hair(rules, template, vertices, target):
     found = target.match(vertices[:stop][scalp], normals[scalp], max_distance=15.0)
     seen = found.weights > 0
     bald = bool(seen.mean() > 0.3 and np.median(found.roughness[seen]) < BALD_RATIO)
-    return (rules if bald else replace(rules, trust=np.where(scalp, 0.0, rules.trust))), bald
+    if not bald:
+        return replace(rules, trust=np.where(scalp, 0.0, rules.trust)), bald
+    inward, outward = (np.where(scalp, np.inf, reach) for reach in (rules.inward, rules.outward))
+    return replace(rules, inward=inward, outward=outward), bald
 
 
 def line_rows(line, crease, weights, n):

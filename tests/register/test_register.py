@@ -54,6 +54,19 @@ def test_the_fit_is_sound(hm08, open_eyed):
     assert lip_gaps_mm(face.fit, face.lines).max() < 0.3
 
 
+def test_the_back_of_a_bald_head_is_followed_however_far_it_lies_from_the_model(hm08):
+    """Of a face nobody can tell how deep its head is: 20 mm more at the back."""
+    truth = person(hm08, 0.4)
+    back = truth[hm08.regions["skull"], 2].min()
+    depth = np.clip((back + 60.0 - truth[:, 2]) / 60.0, 0.0, 1.0)
+    truth = truth - 20.0 * (depth * depth * (3.0 - 2.0 * depth))[:, None] * [0.0, 0.0, 1.0]
+    scan, landmarks = scan_of(hm08, truth)
+    face = register(scan, landmarks, hm08)
+    off = Surface(scan.vertices, scan.faces).closest(face.fit).distance
+    assert face.stats["bald"]
+    assert np.quantile(off[hm08.regions["skull"]], 0.95) < 0.3
+
+
 def test_what_was_given_is_not_changed(hm08, open_eyed):
     truth, scan, _ = open_eyed
     assert np.array_equal(scan.vertices, scan_of(hm08, truth)[0].vertices)
