@@ -30,12 +30,14 @@ _BLINK_STEPS = 0.35, 0.7, 1.0  # a lid turns farthest; chords of a third of its 
 _FULLNESS = 0.6
 _CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
 _CORNER_MM = 2.0
+_SHUT_FOLLOWS = 0.4  # of what the lower lid alone follows the gaze: shut lids that went as far would hang in a U
 
 
 @dataclass(frozen=True)
 class EyeShapeOptions:
     """lids            how lids move
-    look_turn_deg   direction -> degrees by which upper and lower margin follow the gaze (up is positive)
+    look_turn_deg   direction -> degrees by which upper and lower margin follow the gaze (up is positive): the upper
+                    one nearly as far as a ball that turns down by 30, or white shows above the iris as in a stare
     wide_turn_deg   the same for eyeWide
     squint_share    of the opening by which eyeSquint lowers the upper and raises the lower lid
     passing_mm      by which lids lie higher where a blink passes on its way
@@ -44,7 +46,7 @@ class EyeShapeOptions:
 
     lids: LidMotionOptions = field(default_factory=LidMotionOptions)
     look_turn_deg: dict[str, tuple[float, float]] = field(
-        default_factory=lambda: {"Down": (-14.0, -10.0), "Up": (12.0, 4.0), "In": (0.0, 0.0), "Out": (0.0, 0.0)}
+        default_factory=lambda: {"Down": (-23.0, -10.0), "Up": (16.0, 5.0), "In": (0.0, 0.0), "Out": (0.0, 0.0)}
     )
     wide_turn_deg: tuple[float, float] = (12.0, -4.0)
     squint_share: tuple[float, float] = (0.10, 0.30)
@@ -200,7 +202,8 @@ class _Eye:
         ball = self.ball.turned(gaze_rotation(direction, self.side)) if direction else self.ball
         if direction:
             # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
-            turn = np.radians(self.options.look_turn_deg[direction][1]) * self.profiles[1] ** (1.0 / _FULLNESS)
+            degrees = _SHUT_FOLLOWS * self.options.look_turn_deg[direction][1]
+            turn = np.radians(degrees) * self.profiles[1] ** (1.0 / _FULLNESS)
         else:
             turn = self.lids.turn_of(shut, motion)
         return self._full(self.lids.carried(shut, motion, turn, ball), shut + motion)
