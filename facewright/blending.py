@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 # Shapes that no face makes together: the weaker is left out.
 OPPOSED = (("eyeLookUp", "eyeLookDown"), ("eyeLookIn", "eyeLookOut"), ("eyeWide", "eyeBlink"), ("eyeWide", "eyeSquint"))
 OPPOSED_MIDDLE = (("jawLeft", "jawRight"), ("mouthLeft", "mouthRight"))
+# Powers of the root of x^4 = x + 1, less than 1: points by these steps fill a cube evenly (Roberts 2018).
+_EVEN_STEPS = 0.8191725134, 0.6710436067, 0.5497004779
 
 
 def random_blends(expressions, visemes, count, seed):
@@ -20,9 +24,24 @@ def random_blends(expressions, visemes, count, seed):
     for _ in range(count):
         one, other = (faces[i] for i in rng.integers(len(faces), size=2))
         fade, strength, speech = rng.random(3)
-        parts = ((one, strength * (1 - fade)), (other, strength * fade), (words[rng.integers(len(words))], speech))
-        poses.append(possible(_sum(parts)))
+        poses.append(_blend(one, other, fade, strength, words[rng.integers(len(words))], speech))
     return poses
+
+
+def all_blends(expressions, visemes):
+    """Poses {shape: weight} of every two expressions faded into each other, each with the next viseme.
+
+    Fade and strengths go through 0..1 by steps that fill it evenly, strengths more often through the upper half.
+    """
+    words, poses = list(visemes.values()), []
+    for one, other in combinations(expressions.values(), 2):
+        fade, strength, speech = (len(poses) * step % 1.0 for step in _EVEN_STEPS)
+        poses.append(_blend(one, other, fade, strength**0.5, words[len(poses) % len(words)], speech**0.5))
+    return poses
+
+
+def _blend(one, other, fade, strength, word, speech):
+    return possible(_sum(((one, strength * (1 - fade)), (other, strength * fade), (word, speech))))
 
 
 def possible(weights):
