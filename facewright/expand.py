@@ -31,7 +31,11 @@ def expand_weights(pose_weights, in_betweens, correctives, halves=None):
     for target, drivers in correctives.items():
         product = 1.0
         for driver in drivers:
-            product *= min(max(drive.get(driver, 0.0), 0.0), 1.0)
+            weight = drive.get(driver, 0.0)
+            if weight <= 0.0:
+                product = 0.0
+                break
+            product *= min(weight, 1.0)
         if product != 0.0:
             result[target] = result.get(target, 0.0) + product
     return result

@@ -18,6 +18,7 @@ from facewright.contact import (
     find_jaw,
     hold_neck,
     keep_jaw_within,
+    lay_blends_flat,
     lay_flat,
     lay_tongue,
     part_crossings,
@@ -35,7 +36,8 @@ def shapes_of(face, jobs=1):
     carried = lay_tongue(face, keep_jaw_within(face, carried))
     eyes = EyeShapes(face)
     skin = solve_mouth(face, eyes.shapes(carried), jobs=jobs)
-    return _with_riders(face, part_crossings(face, lay_flat(face, skin), jobs, eyes.with_pairs))
+    skin = part_crossings(face, lay_flat(face, skin), jobs, eyes.with_pairs)
+    return _with_riders(face, lay_blends_flat(face, skin))
 
 
 def rig_from_face(face, maps=None, jobs=1):

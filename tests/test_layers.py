@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1] / "facewright"
-BASE = {"data", "conventions", "errors", "mesh", "solve", "working_set"}
+BASE = {"data", "conventions", "errors", "mesh", "solve", "working_set", "blending"}
 ALLOWED = {
     "mesh": {"errors", "conventions", "solve"},
     "solve": {"errors"},

@@ -1,5 +1,6 @@
 """Contact between the moving pieces of a head, solved per head after transfer."""
 
+from facewright.contact.blended import lay_blends_flat
 from facewright.contact.crossings import part_crossings
 from facewright.contact.eyes import EyeShapeOptions, EyeShapes, solve_eyes
 from facewright.contact.folds import lay_flat
@@ -22,6 +23,7 @@ __all__ = [
     "find_jaw",
     "hold_neck",
     "keep_jaw_within",
+    "lay_blends_flat",
     "lay_flat",
     "lay_tongue",
     "part_crossings",

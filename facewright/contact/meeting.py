@@ -20,14 +20,13 @@ from facewright.mesh.intersect import self_intersections
 from facewright.mesh.normals import cross, dot, face_areas, face_corners, face_cross, normalized
 from facewright.mesh.overlap import barycentric, where_edges_pass
 from facewright.mesh.seam import seam_sides
+from facewright.solve.least_motion import least_motion
 
 _REACH_MM, _LINING_MM = 8.0, 3.0  # over the skin and over the lining from the margins: what the other lid may meet
 _MARGIN_GAP_MM = 0.01  # left between two lids beside their margins, at most
 _OVER_MM, _OVER_ENDS_MM = 0.06, 3.0  # by which the upper margin passes the lower one, that far from the canthi
 _NEAR_MM, _DEEPEST_MM = 0.5, 4.0  # lids nearer than this over a place may come to meet there; deeper is no contact
 _MARGIN_EASE = 0.004  # how readily a margin gives way; the rest: 1
-_LEAST_EASE = 1e-3  # taken of a wish that hardly anything can meet, or it would pull without end
-_STEPS = 120
 _FOLD = 10.0  # crossings that a folded face counts as
 _PRESSED, _LEAST_SHARE = 0.5, 0.15  # of its area at rest, seen as it should look: a face is watched, and keeps so much
 _SUSPECT = 0.5  # the same beside its neighbours, from which on it is looked at closely
@@ -112,7 +111,7 @@ class Meeting:
             if unfolded:
                 folds, short = self._folds(self.axes.turned(points, motion / self._far))
                 rows, lack = sp.vstack([A, folds]).tocsr(), np.append(lack, short)
-            motion = motion + _least_motion(rows, lack, self._ease)
+            motion = motion + least_motion(rows, lack, self._ease)
             if not last:
                 motion = self._smoothed(motion)
         turns = np.zeros(len(pose))
@@ -279,18 +278,6 @@ def _meeting(place, height, one, other):
         kept = keep(i, j)
         i, j = i[kept], j[kept]
     return one[i], other[j]
-
-
-def _least_motion(A, over, ease):
-    """(k,) motion u, least in the sum of u^2 / ease, with over + A u <= 0: its dual by projected, accelerated steps."""
-    B, T, pull = abs(A), A.T.tocsr(), np.zeros(len(over))
-    step = 1.0 / np.maximum(B @ (ease * (B.T @ np.ones(len(over)))), _LEAST_EASE)
-    ahead, pace = pull, 1.0
-    for _ in range(_STEPS):
-        before, pull = pull, np.maximum(ahead + step * (over - A @ (ease * (T @ ahead))), 0.0)
-        faster = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * pace**2))
-        ahead, pace = pull + (pace - 1.0) / faster * (pull - before), faster
-    return -ease * (T @ pull)
 
 
 def along_line(wanted, places, values):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from facewright.blending import possible, random_blends
 from facewright.evaluate.eyes import LidDepth
 from facewright.evaluate.play import Player
 from facewright.evaluate.rows import Row
@@ -12,25 +13,6 @@ from facewright.evaluate.shapes import SkinCheck, shape_names
 SEED = 20
 BAR_MM, SHARE_BAR = 0.5, 0.99
 MIXED = 8
-# Shapes that no face makes together: the weaker is left out.
-OPPOSED = (("eyeLookUp", "eyeLookDown"), ("eyeLookIn", "eyeLookOut"), ("eyeWide", "eyeBlink"), ("eyeWide", "eyeSquint"))
-OPPOSED_MIDDLE = (("jawLeft", "jawRight"), ("mouthLeft", "mouthRight"))
-
-
-def random_blends(expressions, visemes, count, seed=SEED):
-    """count poses {shape: weight}: two expressions faded into each other, and a viseme that speaks at the same time.
-
-    Both fade and the strengths of expression and viseme are even in 0..1; weights add up and end at 1.
-    """
-    rng = np.random.default_rng(seed)
-    faces, words = list(expressions.values()), list(visemes.values())
-    poses = []
-    for _ in range(count):
-        one, other = (faces[i] for i in rng.integers(len(faces), size=2))
-        fade, strength, speech = rng.random(3)
-        parts = ((one, strength * (1 - fade)), (other, strength * fade), (words[rng.integers(len(words))], speech))
-        poses.append(possible(_sum(parts)))
-    return poses
 
 
 def random_mixes(names, count, seed=SEED, mixed=MIXED):
@@ -41,22 +23,6 @@ def random_mixes(names, count, seed=SEED, mixed=MIXED):
         possible({names[i]: rng.random() for i in rng.choice(len(names), min(mixed, len(names)), replace=False)})
         for _ in range(count)
     ]
-
-
-def possible(weights):
-    """A pose that a face could make: of opposed shapes the stronger, mouthClose no more than jawOpen.
-
-    mouthClose is made on top of jawOpen and is no pose without it; the tongue comes out between open teeth.
-    """
-    result = {name: min(weight, 1.0) for name, weight in weights.items() if weight > 0.0}
-    pairs = [(a + side, b + side) for a, b in OPPOSED for side in ("Left", "Right")]
-    for a, b in (*pairs, *OPPOSED_MIDDLE):
-        if a in result and b in result:
-            del result[a if result[a] < result[b] else b]
-    for name, share in (("mouthClose", 1.0), ("tongueOut", 2.0)):
-        if name in result:
-            result[name] = min(result[name], share * result.get("jawOpen", 0.0))
-    return result
 
 
 def measure_blends(rig, poses, lips=None):
@@ -84,7 +50,7 @@ def blend_rows(rig, count=1000, lips=None):
     """Rows of random blends of the rig's expressions and visemes, and of random mixes (these without a bar)."""
     rows = []
     if rig.expressions and rig.visemes:
-        figures = measure_blends(rig, random_blends(rig.expressions, rig.visemes, count), lips)
+        figures = measure_blends(rig, random_blends(rig.expressions, rig.visemes, count, SEED), lips)
         rows += _rows(figures, f"{count} blends of expressions", (SHARE_BAR, None), (None, 0))
     mixes = random_mixes(shape_names(rig), max(count // 5, 1))
     return rows + _rows(measure_blends(rig, mixes, lips), f"{len(mixes)} mixes of {MIXED} shapes")
@@ -102,11 +68,3 @@ def _rows(figures, pose, share_bar=(None, None), fold_bar=(None, None)):
     rows.append(Row("blends", pose, "poses with a folded face, share", *map(float, with_folds), bar=fold_bar))
     rows.append(Row("blends", pose, "folded faces, worst", *map(float, figures["folded"].max(axis=0))))
     return rows
-
-
-def _sum(parts):
-    total = {}
-    for weights, strength in parts:
-        for name, weight in weights.items():
-            total[name] = total.get(name, 0.0) + strength * weight
-    return total

@@ -35,11 +35,15 @@ def expected_normals(neutral, moved, faces, asked):
     touched = np.zeros(len(neutral), bool)
     touched[faces[asked]] = True
     covariance = _vertex_covariance(neutral, moved, faces[touching(touched, faces)])
-    around = covariance[faces[asked]].sum(axis=1)  # (k, 3, 3)
-    U, _, Vt = np.linalg.svd(around)
+    return least_turn(covariance[faces[asked]].sum(axis=1), face_normals(neutral, faces[asked]))
+
+
+def least_turn(covariance, vectors):
+    """(k, 3) vectors turned by the rotations that bring (rest)(now)^T, summed up (k, 3, 3), best together (Kabsch)."""
+    U, _, Vt = np.linalg.svd(covariance)
     flip = np.linalg.det(U @ Vt) < 0
     U[flip, :, 2] *= -1
-    return np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), face_normals(neutral, faces[asked]))
+    return np.einsum("mij,mj->mi", np.swapaxes(U @ Vt, 1, 2), vectors)
 
 
 def _vertex_covariance(neutral, moved, faces):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facewright.evaluate.blends import possible, random_blends, random_mixes
+from facewright.blending import possible, random_blends
+from facewright.evaluate.blends import SEED, random_mixes
 from facewright.evaluate.eyes import margin_gap_mm
 from facewright.evaluate.play import Player, both_sides
 from facewright.evaluate.rows import Row, worst_rows
@@ -106,9 +107,9 @@ def test_a_player_plays_halves_for_their_sum(rig):
 
 def test_random_poses_are_possible_and_repeat():
     words = read_working_set()
-    poses = random_blends(words.expressions, words.visemes, 300)
+    poses = random_blends(words.expressions, words.visemes, 300, SEED)
     poses += random_mixes(list(words.words), 300)
-    assert poses == random_blends(words.expressions, words.visemes, 300) + random_mixes(list(words.words), 300)
+    assert poses == random_blends(words.expressions, words.visemes, 300, SEED) + random_mixes(list(words.words), 300)
     for pose in poses:
         assert set(pose) <= set(words.words) and all(0.0 <= weight <= 1.0 for weight in pose.values())
         assert pose.get("mouthClose", 0.0) <= pose.get("jawOpen", 0.0)
