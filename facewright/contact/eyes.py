@@ -18,7 +18,7 @@ from facewright.contact.lids import LidMotionOptions, Lids
 from facewright.contact.pouch import LidLining
 from facewright.contact.retraction import needed_retraction
 from facewright.contact.rims import from_ends
-from facewright.contact.targets import Targets
+from facewright.contact.targets import Targets, is_even
 from facewright.conventions import corrective_name, in_between_name
 from facewright.mesh.fade import smooth_step
 from facewright.mesh.normals import max_norms
@@ -101,7 +101,9 @@ class EyeShapes:
                 target = corrective_name((eye.blink, other))
                 extras[target] = eye.corrective(targets.delta(eye.blink), targets.delta(other), other)
                 correctives[target] = (eye.blink, other)
-        return replace(targets, extras=extras, correctives=correctives)
+        made = replace(targets, extras=extras, correctives=correctives)
+        # A lining that just clears a lid may be pushed on one side and not on the other.
+        return made.evened(self.face.template.mirror) if is_even(self.face) else made
 
 
 class _Eye:
