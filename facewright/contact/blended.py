@@ -33,7 +33,7 @@ from facewright.working_set import read_working_set
 
 _ON_WAY, _FINE = (0.4, 0.75, 1.0), (0.2, 0.35, 0.5, 0.6, 0.75, 0.85, 0.93, 1.0)  # weights of shapes, with in-betweens
 _LIDS, _LOOKS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.35, 0.65, 1.0)  # weights of a blink, and of the looks with it
-_BOTH = (1.0, 1.0), (0.9, 0.5), (0.5, 0.9)  # weights of two shapes with a corrective
+_BOTH = (1.0, 1.0), (0.83, 0.83), (0.65, 0.65), (0.9, 0.5), (0.5, 0.9)  # weights of two shapes with a corrective
 _DIRECTIONS = (("Up",), ("Down",), ("In",), ("Out",), ("In", "Up"), ("In", "Down"), ("Out", "Up"), ("Out", "Down"))
 _SUSPECT = 0.5  # of its area at rest, seen as it should look: less of a face in one shape makes it suspect
 _EVERY = 2  # pose of the sample in which they are asked whether they are at risk
