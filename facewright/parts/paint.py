@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from facewright.mesh.render import linear_to_srgb
 from facewright.parts.paint_lids import paint_blend, paint_lashes, paint_occlusion
 
-_IVORY, _NECK, _EDGE = (0.905, 0.865, 0.785), (0.84, 0.75, 0.62), (0.85, 0.845, 0.82)
+_IVORY, _NECK, _EDGE = (0.93, 0.905, 0.855), (0.90, 0.85, 0.775), (0.885, 0.885, 0.87)  # shades A1 to A2
 _GUM, _MARGIN, _FOLD = (0.78, 0.49, 0.47), (0.83, 0.58, 0.55), (0.66, 0.29, 0.30)
 _TONGUE, _COAT, _BENEATH = (0.76, 0.43, 0.43), (0.80, 0.58, 0.56), (0.66, 0.31, 0.33)
 
@@ -37,10 +37,10 @@ def paint_teeth(look, size=1024):
     streaks = _noise(size, (22, 2), 1) * 0.012 + _noise(size, (9, 9), 2) * 0.012
     color = color * (1 + streaks)[..., None]
     own = np.random.default_rng(3).standard_normal((rows, columns))[row.astype(int), column.astype(int)]
-    yellow = 0.03 + 0.006 * own + 0.04 * (column == 2) + 0.03 * (column > 2)
+    yellow = 0.012 + 0.006 * own + 0.01 * (column == 2)
     color = color * (1 - yellow[..., None] * [0.35, 0.6, 1.6])
     grooves = _step(0.80, 0.97, down) * (1 - front)
-    color = color * (1 - 0.22 * grooves)[..., None]
+    color = color * (1 - 0.12 * grooves)[..., None]
     color = color * (1 - 0.35 * _step(0.26, 0.10, t))[..., None]  # the gum's shade
     return _image(color)
 

@@ -174,7 +174,7 @@ def test_the_inside_of_a_lip_may_lie_in_teeth_on_the_way_but_not_in_the_end(solv
     person, _, _ = solved
     contact = _Mouth(person, MouthOptions()).contact
     back, still = np.zeros((2, *person.vertices.shape))
-    back[contact.lips[~person.regions["outer"][contact.lips]], 2] = -3.0
+    back[contact.lips[~person.regions["outer"][contact.lips]], 2] = -3.5
 
     def push(end, spared_mm):
         path = {0.5: back, 1.0: end}

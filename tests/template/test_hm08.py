@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from facewright.contact.teeth import rows_of_teeth
 from facewright.conventions import ARKIT_SHAPES, mirrored_name
 from facewright.evaluate.quality import lip_gaps_mm, self_intersections, torn_edges, visible_interior_mm2
 from facewright.evaluate.uv import measure_uv
-from facewright.mesh.adjacency import border_loops, half_edges, unique_edges
+from facewright.mesh.adjacency import border_loops, half_edges, unique_edges, vertex_components
 from facewright.mesh.folds import folded_by_shape
+from facewright.mesh.raster import RayScene
 from facewright.template.store import SHIPPED
 
 FLIP = np.array([-1.0, 1.0, 1.0])
@@ -204,6 +206,50 @@ def test_the_lower_lip_of_an_open_jaw_hangs_in_an_arc(hm08):
     assert (share[inside] > 1.1 * q[inside]).all()
     left = np.flatnonzero(way <= 0.5 * way[-1])
     assert (np.diff(share[left]) > 0).all()
+
+
+def crowns(template, name):
+    """[(k, 3) vertices] of the left teeth of a row, from the middle to the back."""
+    part = template.part(name)
+    vertices = template.vertices[part.vertex_slice]
+    tooth = vertex_components(template.faces[part.face_slice] - part.vertices[0], len(vertices))
+    found = [vertices[tooth == number] for number in np.unique(tooth)]
+    return sorted((own for own in found if own[:, 0].mean() > 0), key=lambda own: -own[:, 2].mean())
+
+
+@pytest.mark.parametrize(("name", "up"), [("teeth_upper", 1.0), ("teeth_lower", -1.0)])
+def test_teeth_end_in_an_even_line(hm08, name, up):
+    """As it is seen: no row of splinters behind the incisors."""
+    tips = [(up * own[:, 1]).min() for own in crowns(hm08, name)]
+    assert len(tips) == 7 and np.abs(np.diff(tips)).max() < 1.0 and min(tips) > tips[0] - 0.8
+    for own in crowns(hm08, name)[3:]:
+        surface = own[-37:]  # the shoulder, two rings and the middle
+        assert 0.8 < np.ptp(surface[:, 1]) < 3.0 and np.ptp(surface[-13:, 1]) < 1.0
+
+
+@pytest.mark.parametrize(("name", "up"), [("teeth_upper", 1.0), ("teeth_lower", -1.0)])
+def test_nothing_is_seen_between_the_middle_incisors(hm08, name, up):
+    """But for a groove: from 2 mm beside the edge to 5 mm no ray goes through between them."""
+    part = hm08.part(name)
+    vertices, faces = hm08.vertices[part.vertex_slice], hm08.faces[part.face_slice] - part.vertices[0]
+    edge = (up * crowns(hm08, name)[0][:, 1]).min()
+    x, y = np.meshgrid(np.arange(-1.0, 1.01, 0.02), up * (edge + np.arange(2.0, 5.1, 0.5)))
+    origins = np.stack([x, y, np.full_like(x, 60.0)], axis=-1).reshape(-1, 3)
+    depth = RayScene(vertices, faces).cast(origins, np.broadcast_to([0.0, 0.0, -1.0], origins.shape)).distance
+    assert np.ptp(depth.reshape(x.shape), axis=1).max() < 1.0
+
+
+def test_upper_arch_has_natural_widths(hm08):
+    middles = [own.mean(axis=0) for own in crowns(hm08, "teeth_upper")]
+    assert 31.0 < 2 * middles[2][0] < 38.0 and 46.0 < 2 * middles[5][0] < 55.0
+
+
+def test_rows_of_teeth_bite_on_each_other(hm08):
+    """Without going through each other."""
+    rows = rows_of_teeth(hm08, hm08.vertices)
+    for (_, row), (place, _) in zip(rows, rows[::-1]):
+        outside = row.way_out(hm08.vertices[place], row.vertices)[0]
+        assert (np.linalg.norm(outside, axis=1) > 0).mean() < 0.02
 
 
 def test_jaw_carries_teeth_and_tongue_rigidly(hm08):

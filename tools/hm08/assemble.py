@@ -38,7 +38,7 @@ JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 MATERIALS = {
     "skin": {"color": (0.60, 0.38, 0.29), "roughness": 0.55, "alpha": 1.0},
     "eye": {"color": (0.85, 0.83, 0.80), "roughness": 0.12, "alpha": 1.0},
-    "teeth": {"color": (0.76, 0.70, 0.58), "roughness": 0.18, "alpha": 1.0, "paint": "teeth", "cells": CELLS},
+    "teeth": {"color": (0.82, 0.77, 0.67), "roughness": 0.18, "alpha": 1.0, "paint": "teeth", "cells": CELLS},
     "tongue": {"color": (0.50, 0.19, 0.18), "roughness": 0.5, "alpha": 1.0, "paint": "tongue"},
     "gums": {"color": (0.52, 0.20, 0.19), "roughness": 0.5, "alpha": 1.0, "paint": "gums", "double_sided": True},
     "lashes": {"color": (0.02, 0.015, 0.012), "roughness": 0.7, "alpha": 1.0, "paint": "lashes", "double_sided": True},
