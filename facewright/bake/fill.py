@@ -45,7 +45,6 @@ INTERIORS = {
     "mouth_interior": ((0.42, 0.20, 0.22), 6.0),
     "socket_left": ((0.72, 0.50, 0.50), 3.0),
     "socket_right": ((0.72, 0.50, 0.50), 3.0),
-    "nostrils": ((0.38, 0.26, 0.25), 5.0),
 }
 
 
@@ -103,7 +102,7 @@ def hair_stains(V, F, means, share, hidden, hair, bare):
     odd[odd] = (np.abs(brightness[odd] - usual) > limit) | _nearer_to_hair(
         means[odd], means[skin], hair[cKDTree(V[hidden]).query(V[odd], min(HAIR_NEARBY, hidden.sum()))[1]]
     )
-    odd |= shown & near & bare & (brightness < SHADOW_SHARE * (_continued(V, F, means, skin, near) @ LUMA))
+    odd |= shown & near & bare & (brightness < SHADOW_SHARE * (continued(V, F, means, skin, near) @ LUMA))
     passable, reached = odd | (near & ~shown), hidden
     while True:
         grown = hidden | (dilate(reached, F) & passable)
@@ -113,7 +112,7 @@ def hair_stains(V, F, means, share, hidden, hair, bare):
         reached = grown
 
 
-def _continued(V, F, means, skin, near):
+def continued(V, F, means, skin, near):
     """(n, 3) sRGB of the skin (n,), continued as a membrane to what is near it (n,); means elsewhere."""
     # Guided by nothing it forgets nothing: the shaded side of a head stays shaded.
     everywhere = np.ones(len(V), bool)

@@ -6,13 +6,14 @@ insides and what the scan does not show are filled (bake/fill.py). Light that is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
+from facewright.bake.nostrils import around_nostrils, darkened, hole_rims, nostril_light
 from facewright.bake.project import project_to_scan
 from facewright.bake.pyramid import push_pull
 from facewright.bake.sample import ScanLooks, sample_pixels
@@ -87,10 +88,10 @@ def bake(scan, face, options=None, jobs=1):
     hits = project_to_scan(scan, skin.V, skin.F, rays, texels, wanted, options.max_distance_mm, jobs)
     colors, colored, bends, met = _look(scan, skin, texels, hits, options.size, jobs)
 
-    geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
-    geometry_weight = feather(skin.V, skin.F, skin.outer, geometry_share)
     has_color = bool(colored.any())
-    colored, fill = _filled(scan, face, skin, texels, colors, colored, can_see, jobs)
+    colored, fill, rims = _filled(scan, face, skin, texels, colors, colored, can_see, jobs)
+    geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
+    geometry_weight = feather(skin.V, skin.F, skin.outer, np.where(rims, 0.0, geometry_share))
 
     albedo = _compose_albedo(face.template, skin, texels, colors, colored, fill, jobs)
     normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
@@ -190,16 +191,21 @@ def _look(scan, skin, texels, hits, size, jobs):
 
 
 def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
-    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, and the Fill for the others."""
+    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, the Fill for the others, and (n,) bool
+    of the rims of nostrils that are filled too."""
     n = len(skin.V)
     regions = {name: mask[:n] for name, mask in face.regions.items()}
     means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
     bare = ~_bearded(skin.neutral, regions)
     stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin), bare)
+    nostrils, mirror = regions.get("nostrils", np.zeros(n, bool)), face.template.mirror[:n]
+    light = nostril_light(skin.neutral, skin.F, nostrils)
+    rims = hole_rims(skin, texels, colors, colored, means, share, nostrils, light)
+    rims |= rims[mirror]
 
     def solved():
-        known, default = np.where(stains, 0.0, share), _default_skin(face.template)
-        return solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, known, default)
+        known, default = np.where(stains | rims, 0.0, share), _default_skin(face.template)
+        return solve_fill(skin.neutral, skin.F, regions, mirror, skin.outer, means, known, default)
 
     fill = solved()
     beside = bare & (surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM)
@@ -210,7 +216,8 @@ def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
         colored = colored & ~strands
         means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
         fill = solved()
-    return colored, fill
+    detail = np.where(around_nostrils(skin.neutral, skin.F, nostrils), 0.0, fill.detail)
+    return colored, replace(fill, color=darkened(fill.color, light), detail=detail), rims
 
 
 def _bearded(V, regions):
