@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.bake.charts import find_cuts, find_tears, guarded_edges
 from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
 from facewright.bake.mirror import mirrored_corner_uv
 from facewright.bake.nostrils import around_nostrils, darkened, hole_rims, nostril_light
@@ -86,10 +87,10 @@ def bake(scan, face, options=None, jobs=1):
     wanted = can_see & _observed(skin, texels, jobs)
     rays = vertex_normals(skin.V, skin.F[skin.outer_faces])
     hits = project_to_scan(scan, skin.V, skin.F, rays, texels, wanted, options.max_distance_mm, jobs)
-    colors, colored, bends, met = _look(scan, skin, texels, hits, options.size, jobs)
+    colors, colored, beside, bends, met = _look(scan, skin, texels, hits, options.size, jobs)
 
     has_color = bool(colored.any())
-    colored, fill, rims = _filled(scan, face, skin, texels, colors, colored, can_see, jobs)
+    colored, fill, rims = _filled(scan, face, skin, texels, colors, colored, can_see & ~beside, jobs)
     geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
     geometry_weight = feather(skin.V, skin.F, skin.outer, np.where(rims, 0.0, geometry_share))
 
@@ -163,22 +164,29 @@ def _observed(skin, texels, jobs):
 
 
 def _look(scan, skin, texels, hits, size, jobs):
-    """What the texels see: colours (k, 3) float32, colored (k,), x and y of tangent-space normals (k, 2), met (k,)."""
+    """What the texels see: colours (k, 3) float32, colored (k,), beside (k,) a tear in the scan's picture and so not
+    colored, x and y of tangent-space normals (k, 2), met (k,)."""
     looks = ScanLooks(scan)
+    cuts = find_cuts(looks)
+    if len(cuts.here):
+        looks.guard(guarded_edges(looks, cuts))
+    tears = find_tears(looks, cuts)
     texel_mm = (1.0 / np.maximum(texel_densities(skin.V, skin.F, skin.UV, skin.FT, size), 1e-6)).astype(np.float32)
     normals = vertex_normals(skin.V, skin.F)
     tangents, signs = corner_tangents(skin.V, skin.F, normals, skin.UV, skin.FT)
     tangents, signs = tangents.astype(np.float32), signs.astype(np.float32)
     k = len(texels)
     colors, colored = np.zeros((k, 3), np.float32), np.zeros(k, bool)
-    bends, met = np.zeros((k, 2), np.float32), hits.face >= 0
+    bends, met, beside = np.zeros((k, 2), np.float32), hits.face >= 0, np.zeros(k, bool)
     seen = np.flatnonzero(met)
 
     def work(piece):
         at = seen[piece]
         face, barycentric, on_scan = texels.face[at], texels.barycentric[at], hits.face[at]
         spacing = texel_mm[face]
-        colors[at], colored[at] = looks.colors(on_scan, hits.barycentric[at], spacing)
+        colors[at], known = looks.colors(on_scan, hits.barycentric[at], spacing)
+        beside[at] = known & tears.beside(on_scan, hits.barycentric[at])
+        colored[at] = known & ~tears.islands[on_scan] & ~beside[at]
         normal = unit_rows(at_points(normals, skin.F, face, barycentric))
         tangent = unit_rows(at_corners(tangents, face, barycentric))
         direction = looks.normals(on_scan, hits.barycentric[at], spacing)
@@ -187,7 +195,7 @@ def _look(scan, skin, texels, hits, size, jobs):
         bends[at] = unit_rows(bend)[:, :2]
 
     in_chunks(work, len(seen), jobs)
-    return colors, colored, bends, met
+    return colors, colored, beside, bends, met
 
 
 def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
