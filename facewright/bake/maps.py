@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from facewright.bake.charts import find_cuts, find_tears, guarded_edges
 from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
+from facewright.bake.grain import grain, grain_strength
 from facewright.bake.mirror import mirrored_corner_uv
 from facewright.bake.nostrils import around_nostrils, darkened, hole_rims, nostril_light
 from facewright.bake.project import project_to_scan
@@ -40,6 +41,7 @@ STRANDS_MM, STRAND_SHARE, STRAND_ROUNDS = 15.0, 0.9, 2
 BROWS_MM = 32.0  # from eyes, lips and nostrils
 SPECK_MM = 6.0
 HAIR_TEXEL_MM = 2.0  # hair's colour is that of a lock, not of a strand
+DETAIL_STRIDE = 31
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
 
 
@@ -94,7 +96,7 @@ def bake(scan, face, options=None, jobs=1):
     geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
     geometry_weight = feather(skin.V, skin.F, skin.outer, np.where(rims, 0.0, geometry_share))
 
-    albedo = _compose_albedo(face.template, skin, texels, colors, colored, fill, jobs)
+    albedo = _compose_albedo(face, skin, texels, colors, colored, fill, jobs)
     normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
     weight = fill.weight if has_color else geometry_weight
     coverage = _coverage(skin, texels, colored if has_color else met, weight, can_see, jobs)
@@ -254,32 +256,46 @@ def _strands(skin, texels, colors, beside, fill, jobs):
     return _joined(in_chunks(work, len(texels), jobs), (0,), bool)
 
 
-def _compose_albedo(template, skin, texels, colors, colored, fill, jobs):
+def _compose_albedo(face, skin, texels, colors, colored, fill, jobs):
     """(size, size, 3) uint8: the scan's colours, the fill where it has none, gutters."""
+    template, n = face.template, len(skin.V)
+    bare = ~_bearded(skin.neutral, {name: mask[:n] for name, mask in face.regions.items()})
     seen = _spread(texels, colors, colored)
     corner_uv = mirrored_corner_uv(skin.F, template.polygons, template.uv_polygons, template.uv, template.mirror)
     mirrored_face = np.isfinite(corner_uv).all(axis=(1, 2))
     size = texels.size
     result = np.empty((len(texels), 3), np.float32)
+    strength = grain_strength(_details(skin, texels, colors, colored & bare[skin.F].all(axis=1)[texels.face], fill))
+    strength = strength.astype(np.float32)
+    rough = bool(strength.any())
 
     def work(piece):
         face, barycentric = texels.face[piece], texels.barycentric[piece]
         # Faces behind a rim may lie in another chart: what was spread there from seen texels is of other skin.
         here = skin.outer_faces[face]
         weight = (at_points(fill.weight, skin.F, face, barycentric) * here)[:, None]
-        own = seen[texels.index[piece]]
         filled = at_points(fill.color, skin.F, face, barycentric)
         detail = at_points(fill.detail, skin.F, face, barycentric) * here
         at = np.flatnonzero((detail > 0) & (weight[:, 0] < 1) & mirrored_face[face])
         uv = at_corners(corner_uv, face[at], barycentric[at])
         other = sample_pixels(seen.reshape(size, size, 3), uv.astype(np.float64) * size)
         other -= at_points(fill.mirrored, skin.F, face[at], barycentric[at])
-        filled[at] += detail[at, None] * other
-        result[piece] = own * weight + filled * (1 - weight)
+        filled[at] += (detail[at, None] * (1 - weight[at])) * other
+        own = seen[texels.index[piece]] - at_points(fill.own, skin.F, face, barycentric)
+        at = np.flatnonzero((weight[:, 0] < 1) & (detail < 1) & here & rough)
+        share = np.sqrt(1 - np.square(weight[at, 0])) * (1 - detail[at])
+        filled[at] += (share * grain(at_points(skin.neutral, skin.F, face[at], barycentric[at])))[:, None] * strength
+        result[piece] = filled + weight * own
 
     in_chunks(work, len(texels), jobs)
     image = _spread(texels, result, np.ones(len(texels), bool), gutters=True)
     return _bytes(image).reshape(size, size, 3)
+
+
+def _details(skin, texels, colors, chosen, fill):
+    """(j, 3) differences of some of the chosen texels (k,) from the scan's low-pass colour, where it is fully seen."""
+    at = np.flatnonzero(chosen & (fill.weight == 1)[skin.F].all(axis=1)[texels.face])[::DETAIL_STRIDE]
+    return colors[at] - at_points(fill.own, skin.F, texels.face[at], texels.barycentric[at])
 
 
 def _compose_normal(skin, texels, bends, met, weight, jobs):
