@@ -20,7 +20,7 @@ SMALL_MM2 = 200.0
 STEP, STEP_TIMES = 12.0, 2.0  # sRGB; and in times of the usual step at the scan's cuts
 SEAM_MM = 0.7  # to each side of a cut with such a step
 TEXEL_MM = 0.7
-_ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)
+_ALONG = (0.17, 0.5, 0.83)
 
 
 @dataclass(frozen=True)
@@ -53,39 +53,40 @@ class Tears:
 
 
 def guarded_edges(looks, cuts):
-    """(m, 3) bool: the cut edges i -> i + 1 of faces where samples must stay off what lies across.
+    """(m, 3) bool: the cut edges i -> i + 1 of faces where samples must stay off what lies across, and (k,) the step of
+    colour that is left at each of the Cuts.
 
     In an atlas with gutters, or in a photograph that goes on beyond a cut, what lies across is right, and samples that
-    keep off it make a step of their own. cuts as find_cuts gives them.
+    keep off it make a step of their own.
     """
-    guarded = looks.seams.copy()
+    guarded = np.ones((len(cuts.chart), 3), bool)
     if not len(cuts.here):
-        return guarded
+        return guarded, np.zeros(0)
     kept, plain = (_along(looks, cuts, guard) for guard in (True, False))
     bleeding = 0.5 * (np.abs(plain[0] - kept[0]) + np.abs(plain[1] - kept[1])).mean(axis=(0, 2))
-    open_ = _step(plain) + bleeding < _step(kept)
+    steps, bare = _steps(kept), _steps(plain)
+    harmless = bare + bleeding < steps
+    guarded = looks.seams.copy()
     for side in (cuts.here, cuts.there):
-        guarded.ravel()[side[open_]] = False
-    return guarded
+        guarded.ravel()[side[harmless]] = False
+    return guarded, np.where(harmless, bare, steps)
 
 
-def find_tears(looks, cuts):
-    """The Tears of a scan (sample.ScanLooks) along its Cuts."""
-    scan = looks.scan
+def find_tears(scan, cuts, steps):
+    """The Tears of a scan whose Cuts have these steps (k,) of colour."""
     islands, heights = np.zeros(len(scan.faces), bool), np.zeros((len(scan.faces), 3))
-    if not (scan.has_texture and len(cuts.here)):
+    if not len(cuts.here):
         return Tears(islands, heights)
-    step = _step(_along(looks, cuts, True))
-    limit = max(STEP, STEP_TIMES * float(np.median(step)))
+    limit = max(STEP, STEP_TIMES * float(np.median(steps)))
     ends = half_edges(scan.faces)[cuts.here]
     length = np.linalg.norm(scan.vertices[ends[:, 0]] - scan.vertices[ends[:, 1]], axis=1)
     areas = face_areas(scan.vertices, scan.faces)
     count = int(cuts.chart.max()) + 1
-    total, whole, torn = np.zeros(count), np.zeros(count), step > limit
+    total, whole, torn = np.zeros(count), np.zeros(count), steps > limit
     for side in (cuts.here, cuts.there):
         own = cuts.chart[side // 3]
         whole += np.bincount(own, length, count)
-        total += np.bincount(own, length * step, count)
+        total += np.bincount(own, length * steps, count)
         heights.ravel()[side[torn]] = 2.0 * areas[side[torn] // 3] / np.maximum(length[torn], 1e-9)
     islands = ((np.bincount(cuts.chart, areas, count) < SMALL_MM2) & (total > limit * whole))[cuts.chart]
     return Tears(islands, heights)
@@ -134,6 +135,6 @@ def _along(looks, cuts, guard):
     return result
 
 
-def _step(along):
+def _steps(along):
     """(k,) mean difference of what both sides (2, a, k, 3) show."""
     return np.abs(along[0] - along[1]).mean(axis=(0, 2))

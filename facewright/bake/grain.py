@@ -11,9 +11,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-VOXELS = 64  # a side; the noise repeats after that
-OCTAVES_MM = (0.4, 1.1)  # a voxel
-SMOOTH = 0.8  # voxels: so that neither the grid nor single voxels are seen
+VOXELS, VOXEL_MM = 96, 0.45  # a side; the noise repeats after that
+SMOOTH = (0.8, 2.2)  # voxels, of each octave: neither the grid nor single voxels are seen
 MOST = 8.0  # sRGB; more is a beard or the noise of a camera
 
 
@@ -26,16 +25,15 @@ def grain_strength(details):
 
 def grain(points):
     """(k,) float32 noise of standard deviation about 1 at points (k, 3) in mm; the same points give the same noise."""
-    noise = np.zeros(len(points), np.float32)
-    for octave, voxel_mm in enumerate(OCTAVES_MM):
-        places = np.roll(points, octave, axis=1).T.astype(np.float32) / np.float32(voxel_mm)
-        noise += map_coordinates(_volume(octave), places, order=1, mode="grid-wrap", prefilter=False)
-    return noise / np.float32(np.sqrt(len(OCTAVES_MM)))
+    places = points.T.astype(np.float32) / np.float32(VOXEL_MM)
+    return map_coordinates(_volume(), places, order=1, mode="grid-wrap", prefilter=False)
 
 
-@lru_cache(maxsize=len(OCTAVES_MM))
-def _volume(seed):
+@lru_cache(maxsize=1)
+def _volume():
     """(VOXELS, VOXELS, VOXELS) float32 noise of standard deviation 1 that goes on at its ends."""
-    white = np.random.default_rng(seed).standard_normal((VOXELS,) * 3)
-    smooth = gaussian_filter(white, SMOOTH, mode="wrap")
-    return (smooth / smooth.std()).astype(np.float32)
+    random, total = np.random.default_rng(0), np.zeros((VOXELS,) * 3, np.float32)
+    for sigma in SMOOTH:
+        octave = gaussian_filter(random.standard_normal(total.shape, np.float32), sigma, mode="wrap")
+        total += octave / octave.std()
+    return total / total.std()

@@ -170,9 +170,10 @@ def _look(scan, skin, texels, hits, size, jobs):
     colored, x and y of tangent-space normals (k, 2), met (k,)."""
     looks = ScanLooks(scan)
     cuts = find_cuts(looks)
+    guarded, steps = guarded_edges(looks, cuts)
+    tears = find_tears(looks.scan, cuts, steps)
     if len(cuts.here):
-        looks.guard(guarded_edges(looks, cuts))
-    tears = find_tears(looks, cuts)
+        looks.guard(guarded)
     texel_mm = (1.0 / np.maximum(texel_densities(skin.V, skin.F, skin.UV, skin.FT, size), 1e-6)).astype(np.float32)
     normals = vertex_normals(skin.V, skin.F)
     tangents, signs = corner_tangents(skin.V, skin.F, normals, skin.UV, skin.FT)
@@ -267,22 +268,21 @@ def _compose_albedo(face, skin, texels, colors, colored, fill, jobs):
     result = np.empty((len(texels), 3), np.float32)
     strength = grain_strength(_details(skin, texels, colors, colored & bare[skin.F].all(axis=1)[texels.face], fill))
     strength = strength.astype(np.float32)
-    rough = bool(strength.any())
+    rough, here = bool(strength.any()), skin.outer_faces
+    known = np.column_stack([fill.color, fill.own, fill.weight, fill.detail])
 
     def work(piece):
         face, barycentric = texels.face[piece], texels.barycentric[piece]
+        values = at_points(known, skin.F, face, barycentric)
+        filled, own = values[:, :3], seen[texels.index[piece]] - values[:, 3:6]
         # Faces behind a rim may lie in another chart: what was spread there from seen texels is of other skin.
-        here = skin.outer_faces[face]
-        weight = (at_points(fill.weight, skin.F, face, barycentric) * here)[:, None]
-        filled = at_points(fill.color, skin.F, face, barycentric)
-        detail = at_points(fill.detail, skin.F, face, barycentric) * here
-        at = np.flatnonzero((detail > 0) & (weight[:, 0] < 1) & mirrored_face[face])
+        weight, detail = values[:, 6:7] * here[face, None], values[:, 7] * here[face]
+        at = np.flatnonzero((weight[:, 0] < 1) & (detail > 0) & mirrored_face[face])
         uv = at_corners(corner_uv, face[at], barycentric[at])
         other = sample_pixels(seen.reshape(size, size, 3), uv.astype(np.float64) * size)
         other -= at_points(fill.mirrored, skin.F, face[at], barycentric[at])
         filled[at] += (detail[at, None] * (1 - weight[at])) * other
-        own = seen[texels.index[piece]] - at_points(fill.own, skin.F, face, barycentric)
-        at = np.flatnonzero((weight[:, 0] < 1) & (detail < 1) & here & rough)
+        at = np.flatnonzero((weight[:, 0] < 1) & (detail < 1) & here[face] & rough)
         share = np.sqrt(1 - np.square(weight[at, 0])) * (1 - detail[at])
         filled[at] += (share * grain(at_points(skin.neutral, skin.F, face[at], barycentric[at])))[:, None] * strength
         result[piece] = filled + weight * own

@@ -23,7 +23,7 @@ LEAST = 0.06  # share of the light in the depth
 WALLS = (0.82, 1.07, 1.16)  # powers of the light: it has met red skin before, as in a mouth
 SHADED = 0.9  # what has less light than this is not read from a scan
 HOLE_SHARE, HOLE_TEXELS = 0.75, 0.05  # darker than this share of the skin around, in so many of a vertex's texels
-_DIRECTIONS = 256
+_DIRECTIONS = 128
 
 
 def around_nostrils(V, F, nostrils):
