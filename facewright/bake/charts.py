@@ -1,4 +1,4 @@
-"""Where the picture of a scan is torn: along cuts of its atlas, and in islands that show something else than all around.
+"""Where the picture of a scan is torn: along cuts of its atlas, and in islands that differ from all around them.
 
 A scan whose picture is put together from photographs has a step where another camera begins, and sometimes a few
 triangles from another camera than all their neighbours: a patch of a lid that shows the eye. Edges of atlases with

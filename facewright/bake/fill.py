@@ -27,8 +27,8 @@ from facewright.solve.quadratic import Factorization
 
 TRUSTED_MM = 2.0
 FEATHER_MM = 5.0
-# Of holes that are wider than twice LARGE_MM: beyond them is no detail for a long way, and its end would be seen. Within
-# the band colours give way to their surroundings too, the more the nearer the hole: as if seen through EASE_MM.
+# Towards what neither side shows for more than twice LARGE_MM there is no detail for a long way, and its end would be
+# seen. Within the band colours give way to what is around them too, the more the nearer the hole: up to over EASE_MM.
 LARGE_MM, BAND_MM, EASE_MM = 8.0, 15.0, 8.0
 SHOWN_SHARE = 0.5
 # Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
@@ -53,7 +53,7 @@ INTERIORS = {
 
 @dataclass(frozen=True)
 class Fill:
-    """color (n, 3) sRGB 0..255 of every vertex, low-pass; weight (n,) 0..1 of the detail that the scan shows, feathered;
+    """color (n, 3) sRGB 0..255 of every vertex, low-pass; weight (n,) 0..1 of the scan's own detail, feathered;
     own (n, 3) low-pass colour of the scan itself, which that detail is measured from;
     detail (n,) 0..1 weight of the mirrored side's detail; mirrored (n, 3) low-pass colour of the mirrored side, which
     that detail is measured from.
@@ -76,16 +76,16 @@ def surface_distance(V, F, sources, limit):
     return np.minimum(distance, limit)
 
 
-def feather(V, F, outer, share):
+def feather(V, F, outer, share, mirror):
     """(n,) weight of what the scan shows: 1 inside, falling to 0 over 5 mm towards holes of the scan, 15 mm towards
-    large ones.
+    large ones that the other side has as well.
 
     outer (n,) bool: vertices that can be seen; share (n,) of the texels around a vertex that met the scan, NaN where
-    it has none. The rims of mouth, lids and nostrils are no holes: there the scan's colour is kept to the last texel.
+    it has none; mirror (n,). The rims of mouth and lids are no holes: there the scan's colour is kept to the end.
     """
     holes = outer & (share < SHOWN_SHARE)
     distance = surface_distance(V, F, holes, FEATHER_MM)
-    wide = surface_distance(V, F, _large(V, F, holes), BAND_MM)
+    wide = surface_distance(V, F, _large(V, F, holes & holes[mirror]), BAND_MM)
     weight = np.minimum(smooth_step(distance, 1.0, FEATHER_MM), smooth_step(wide, 1.0, BAND_MM))
     return np.where(outer & ~holes, weight, 0.0)
 
@@ -161,13 +161,13 @@ def solve_fill(V, F, regions, mirror, outer, means, share, default):
     default (3,) sRGB, the skin's colour where the scan has none at all
     """
     n = len(V)
-    weight = feather(V, F, outer, share)
+    weight = feather(V, F, outer, share, mirror)
     holes = outer & (share < SHOWN_SHARE)
     known = outer & (share >= SHOWN_SHARE) & (surface_distance(V, F, holes, TRUSTED_MM) >= TRUSTED_MM)
     skin = np.median(means[known], axis=0) if known.any() else np.asarray(default, float)
     color = np.where(known[:, None], means, skin)
 
-    wide = surface_distance(V, F, _large(V, F, holes), BAND_MM)
+    wide = surface_distance(V, F, _large(V, F, holes & holes[mirror]), BAND_MM)
     eased = known & (wide < BAND_MM)
     own = np.where((outer & (share >= SHOWN_SHARE))[:, None], means, np.nan)
 
@@ -181,7 +181,7 @@ def solve_fill(V, F, regions, mirror, outer, means, share, default):
     memory = np.where(twin_known, np.inf, FORGET_MM)
     memory[eased] = np.maximum(EASE_MM * (1.0 - wide[eased] / BAND_MM), 1e-3)
     held = known & ~eased
-    color = _poisson(V, F, color, held, outer & ~held, guide, twin_known & ~known, rest, memory)
+    color = _poisson(V, F, color, held, outer & ~held, guide, twin_known & ~eased, rest, memory)
     fixed = outer.copy()
     behind = surface_distance(V, F, outer, 20.0)
     for name, (tone, depth) in INTERIORS.items():
@@ -199,7 +199,8 @@ def solve_fill(V, F, regions, mirror, outer, means, share, default):
 def _poisson(V, F, color, held, free, guide, guided, rest, memory):
     """Solve for the colours (n, 3) of the free vertices between the held ones; others take no part.
 
-    guide (n, 3) where guided (n,); memory (n,) or one, mm: over so far what is held is forgotten for rest, (3,) or (n, 3)
+    guide (n, 3) where guided (n,); memory (n,) or one, mm: what is held is forgotten over it
+    rest (3,) or (n, 3): the colour for which it is forgotten
     """
     if not free.any():
         return color

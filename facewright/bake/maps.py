@@ -94,7 +94,8 @@ def bake(scan, face, options=None, jobs=1):
     has_color = bool(colored.any())
     colored, fill, rims = _filled(scan, face, skin, texels, colors, colored, can_see & ~beside, jobs)
     geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
-    geometry_weight = feather(skin.V, skin.F, skin.outer, np.where(rims, 0.0, geometry_share))
+    shown, mirror = np.where(rims, 0.0, geometry_share), face.template.mirror[: len(skin.V)]
+    geometry_weight = feather(skin.V, skin.F, skin.outer, shown, mirror)
 
     albedo = _compose_albedo(face, skin, texels, colors, colored, fill, jobs)
     normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
@@ -202,8 +203,8 @@ def _look(scan, skin, texels, hits, size, jobs):
 
 
 def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
-    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, the Fill for the others, and (n,) bool
-    of the rims of nostrils that are filled too."""
+    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, the Fill for the others, and (n,)
+    bool of the rims of nostrils that are filled too."""
     n = len(skin.V)
     regions = {name: mask[:n] for name, mask in face.regions.items()}
     means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)

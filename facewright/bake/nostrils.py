@@ -2,7 +2,7 @@
 
 A scanner sees a nostril as a dark stain with a ragged edge, as a shallow lit pit or as a plug, and its rim hardly ever
 lies on the rim of the fit. So the scan's word is not taken where it shows the hole beside the template's one. Openness
-alone leaves the floor behind a wide rim pale, depth alone lights what lies before a rim that is deep inside: both count.
+alone leaves the floor behind a wide rim pale, depth alone lights what lies before a rim deep inside: both count.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ def darkened(colors, light):
 
 
 def hole_rims(skin, texels, colors, colored, means, share, nostrils, light):
-    """(n,) bool: skin at and before the rims of nostrils (n,) bool that is not read from a scan, alike on both sides.
+    """(n,) bool: skin at and before the rims of nostrils (n,) bool that is not read from a scan.
 
-    skin has V, F, outer (maps.bake); colors (k, 3), colored (k,) of its texels, means (n, 3), share (n,) of its vertices
-    light (n,) as nostril_light gives it
+    skin has V, F, outer (maps.bake); colors (k, 3), colored (k,) are those of its texels, means (n, 3), share (n,) of
+    its vertices; light (n,) as nostril_light gives it
     """
     near = around_nostrils(skin.V, skin.F, nostrils) & skin.outer
     around = skin.outer & ~near & (share >= SHOWN_SHARE)

@@ -63,9 +63,7 @@ class ScanLooks:
             for number, pyramid in enumerate(self.pyramids):
                 chosen = np.flatnonzero(image == number)
                 if len(chosen):
-                    colors[chosen] = self._sample(
-                        pyramid, face[chosen], barycentric[chosen], texel_mm[chosen], guard
-                    )
+                    colors[chosen] = self._sample(pyramid, face[chosen], barycentric[chosen], texel_mm[chosen], guard)
             return colors, image >= 0
         if self.scan.colors is not None:
             colors = at_points(self.scan.colors * 255.0, self.scan.faces, face, barycentric)
