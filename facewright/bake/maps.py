@@ -1,7 +1,8 @@
 """Albedo, normal and coverage maps in the template's layout, baked from a scan through a fitted head.
 
 Texels of the outer skin look at the scan from face.fit, the surface that lies on it. Inner mouth, eye sockets, nostril
-insides and what the scan does not show are filled (bake/fill.py). Light that is baked into a scan's colours stays.
+insides and what the scan does not show are filled (bake/fill.py), and so are rims of nostrils (bake/nostrils.py) and
+what is torn in the scan's own picture (bake/charts.py). Light that is baked into a scan's colours stays.
 """
 
 from __future__ import annotations
