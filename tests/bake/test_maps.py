@@ -159,7 +159,7 @@ def test_a_hole_that_the_scan_shows_beside_the_nostril_is_filled(ball_face, ball
     light = at(maps, "albedo", texels)[:, 0] / (255 * 0.7)
     rim = at_hole(directions, 17.0) & (coverage != INSIDE)
     assert (coverage[rim] == FILLED).mean() > 0.95
-    assert np.percentile(light[rim], 5) > 0.9
+    assert np.percentile(light[rim], 5) > 0.8
     deep = at_hole(directions, 6.0)
     assert light[deep].max() < 0.6 and (coverage[deep] == INSIDE).all()
     assert (coverage[~at_hole(directions, 38.0)] == SEEN).all()
