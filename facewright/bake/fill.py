@@ -29,7 +29,7 @@ TRUSTED_MM = 2.0
 FEATHER_MM = 5.0
 # Towards what neither side shows for more than twice LARGE_MM there is no detail for a long way, and its end would be
 # seen. Within the band colours give way to what is around them too, the more the nearer the hole: up to over EASE_MM.
-LARGE_MM, BAND_MM, EASE_MM = 8.0, 15.0, 8.0
+LARGE_MM, BAND_MM, EASE_MM = 8.0, 15.0, 16.0
 SHOWN_SHARE = 0.5
 # Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
 # is hair.
