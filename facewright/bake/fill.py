@@ -27,6 +27,9 @@ from facewright.solve.quadratic import Factorization
 
 TRUSTED_MM = 2.0
 FEATHER_MM = 5.0
+# Towards what neither side shows for more than twice LARGE_MM there is no detail for a long way, and its end would be
+# seen. Within the band colours give way to what is around them too, the more the nearer the hole: up to over EASE_MM.
+LARGE_MM, BAND_MM, EASE_MM = 8.0, 15.0, 16.0
 SHOWN_SHARE = 0.5
 # Around hidden hair, what is this far off the skin's brightness (sRGB, in times its usual spread, or as a share of it)
 # is hair.
@@ -45,19 +48,20 @@ INTERIORS = {
     "mouth_interior": ((0.42, 0.20, 0.22), 6.0),
     "socket_left": ((0.72, 0.50, 0.50), 3.0),
     "socket_right": ((0.72, 0.50, 0.50), 3.0),
-    "nostrils": ((0.38, 0.26, 0.25), 5.0),
 }
 
 
 @dataclass(frozen=True)
 class Fill:
-    """color (n, 3) sRGB 0..255 of every vertex, low-pass; weight (n,) 0..1 of what the scan shows, feathered;
+    """color (n, 3) sRGB 0..255 of every vertex, low-pass; weight (n,) 0..1 of the scan's own detail, feathered;
+    own (n, 3) low-pass colour of the scan itself, which that detail is measured from;
     detail (n,) 0..1 weight of the mirrored side's detail; mirrored (n, 3) low-pass colour of the mirrored side, which
     that detail is measured from.
     """
 
     color: np.ndarray
     weight: np.ndarray
+    own: np.ndarray
     detail: np.ndarray
     mirrored: np.ndarray
 
@@ -72,15 +76,24 @@ def surface_distance(V, F, sources, limit):
     return np.minimum(distance, limit)
 
 
-def feather(V, F, outer, share):
-    """(n,) weight of what the scan shows: 1 inside, falling to 0 over 5 mm towards holes of the scan.
+def feather(V, F, outer, share, mirror):
+    """(n,) weight of what the scan shows: 1 inside, falling to 0 over 5 mm towards holes of the scan, 15 mm towards
+    large ones that the other side has as well.
 
     outer (n,) bool: vertices that can be seen; share (n,) of the texels around a vertex that met the scan, NaN where
-    it has none. The rims of mouth, lids and nostrils are no holes: there the scan's colour is kept to the last texel.
+    it has none; mirror (n,). The rims of mouth and lids are no holes: there the scan's colour is kept to the end.
     """
     holes = outer & (share < SHOWN_SHARE)
     distance = surface_distance(V, F, holes, FEATHER_MM)
-    return np.where(outer & ~holes, smooth_step(distance, 1.0, FEATHER_MM), 0.0)
+    wide = surface_distance(V, F, _large(V, F, holes & holes[mirror]), BAND_MM)
+    weight = np.minimum(smooth_step(distance, 1.0, FEATHER_MM), smooth_step(wide, 1.0, BAND_MM))
+    return np.where(outer & ~holes, weight, 0.0)
+
+
+def _large(V, F, holes):
+    """(n,) bool: vertices of holes (n,) bool that are wider than twice LARGE_MM."""
+    core = holes & (surface_distance(V, F, ~holes, LARGE_MM) >= LARGE_MM)
+    return holes & (surface_distance(V, F, core, 2.0 * LARGE_MM) < 2.0 * LARGE_MM)
 
 
 def hair_stains(V, F, means, share, hidden, hair, bare):
@@ -103,7 +116,7 @@ def hair_stains(V, F, means, share, hidden, hair, bare):
     odd[odd] = (np.abs(brightness[odd] - usual) > limit) | _nearer_to_hair(
         means[odd], means[skin], hair[cKDTree(V[hidden]).query(V[odd], min(HAIR_NEARBY, hidden.sum()))[1]]
     )
-    odd |= shown & near & bare & (brightness < SHADOW_SHARE * (_continued(V, F, means, skin, near) @ LUMA))
+    odd |= shown & near & bare & (brightness < SHADOW_SHARE * (continued(V, F, means, skin, near) @ LUMA))
     passable, reached = odd | (near & ~shown), hidden
     while True:
         grown = hidden | (dilate(reached, F) & passable)
@@ -113,11 +126,12 @@ def hair_stains(V, F, means, share, hidden, hair, bare):
         reached = grown
 
 
-def _continued(V, F, means, skin, near):
+def continued(V, F, means, skin, near):
     """(n, 3) sRGB of the skin (n,), continued as a membrane to what is near it (n,); means elsewhere."""
     # Guided by nothing it forgets nothing: the shaded side of a head stays shaded.
     everywhere = np.ones(len(V), bool)
-    return _poisson(V, F, means, skin, near, np.zeros_like(means), everywhere, np.median(means[skin], axis=0))
+    middle = np.median(means[skin], axis=0)
+    return _poisson(V, F, means, skin, near, np.zeros_like(means), everywhere, middle, np.inf)
 
 
 def _nearer_to_hair(colors, skin, hair):
@@ -147,35 +161,46 @@ def solve_fill(V, F, regions, mirror, outer, means, share, default):
     default (3,) sRGB, the skin's colour where the scan has none at all
     """
     n = len(V)
-    weight = feather(V, F, outer, share)
+    weight = feather(V, F, outer, share, mirror)
     holes = outer & (share < SHOWN_SHARE)
     known = outer & (share >= SHOWN_SHARE) & (surface_distance(V, F, holes, TRUSTED_MM) >= TRUSTED_MM)
     skin = np.median(means[known], axis=0) if known.any() else np.asarray(default, float)
     color = np.where(known[:, None], means, skin)
+
+    wide = surface_distance(V, F, _large(V, F, holes & holes[mirror]), BAND_MM)
+    eased = known & (wide < BAND_MM)
+    own = np.where((outer & (share >= SHOWN_SHARE))[:, None], means, np.nan)
 
     twin_known = known[mirror] & outer
     nowhere = outer & ~known & ~twin_known
     twin_known &= surface_distance(V, F, nowhere, LOST_MM) >= LOST_MM
     guide = np.where(twin_known[:, None], means[mirror], 0.0)
     # The skin first, then what lies behind its rims: a dark mouth must not tint a cheek that nobody saw.
-    color = _poisson(V, F, color, known, outer & ~known, guide, twin_known, skin)
+    rest = np.where(eased[:, None], means, skin)
+    # Guided by the other side nothing is forgotten.
+    memory = np.where(twin_known, np.inf, FORGET_MM)
+    memory[eased] = np.maximum(EASE_MM * (1.0 - wide[eased] / BAND_MM), 1e-3)
+    held = known & ~eased
+    color = _poisson(V, F, color, held, outer & ~held, guide, twin_known & ~eased, rest, memory)
     fixed = outer.copy()
     behind = surface_distance(V, F, outer, 20.0)
     for name, (tone, depth) in INTERIORS.items():
         deep = regions.get(name, np.zeros(n, bool)) & ~outer & (behind >= depth)
         color[deep] = skin * tone
         fixed |= deep
-    color = _poisson(V, F, color, fixed, ~fixed, guide, np.zeros(n, bool), skin)
+    color = _poisson(V, F, color, fixed, ~fixed, guide, np.zeros(n, bool), skin, FORGET_MM)
     # No detail on faces that touch an unknown twin: an edge may be longer than the ramp.
     unknown = dilate(outer & ~twin_known, F)
     detail = np.where(outer, np.clip(surface_distance(V, F, unknown, FEATHER_MM) / FEATHER_MM, 0.0, 1.0), 0.0)
-    return Fill(color, weight, detail, color[mirror])
+    own = np.where(np.isfinite(own), own, color)
+    return Fill(color, weight, own, detail, own[mirror])
 
 
-def _poisson(V, F, color, held, free, guide, guided, rest):
+def _poisson(V, F, color, held, free, guide, guided, rest, memory):
     """Solve for the colours (n, 3) of the free vertices between the held ones; others take no part.
 
-    guide (n, 3) where guided (n,); rest (3,) is the colour where nothing held is connected.
+    guide (n, 3) where guided (n,); memory (n,) or one, mm: what is held is forgotten over it
+    rest (3,) or (n, 3): the colour for which it is forgotten
     """
     if not free.any():
         return color
@@ -194,11 +219,9 @@ def _poisson(V, F, color, held, free, guide, guided, rest):
     spacing = np.bincount(edges.ravel(), np.repeat(length, 2), n) / np.maximum(
         np.bincount(edges.ravel(), minlength=n), 1
     )
-    ridge = RIDGE * max(weights.mean() if len(weights) else 1.0, 1e-9) + np.where(
-        guided, 0.0, 1.5 * spacing / FORGET_MM**2
-    )
+    ridge = RIDGE * max(weights.mean() if len(weights) else 1.0, 1e-9) + 1.5 * spacing / np.square(memory)
     system = A[free][:, free] + sp.diags(ridge[free])
-    right = b[free] - A[free][:, held] @ color[held] + ridge[free, None] * rest
+    right = b[free] - A[free][:, held] @ color[held] + (ridge[:, None] * rest)[free]
     result = color.copy()
     result[free] = np.clip(Factorization(system).solve(right), 0.0, 255.0)
     return result

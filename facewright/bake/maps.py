@@ -1,18 +1,22 @@
 """Albedo, normal and coverage maps in the template's layout, baked from a scan through a fitted head.
 
 Texels of the outer skin look at the scan from face.fit, the surface that lies on it. Inner mouth, eye sockets, nostril
-insides and what the scan does not show are filled (bake/fill.py). Light that is baked into a scan's colours stays.
+insides and what the scan does not show are filled (bake/fill.py), and so are rims of nostrils (bake/nostrils.py) and
+what is torn in the scan's own picture (bake/charts.py). Light that is baked into a scan's colours stays.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.bake.charts import find_cuts, find_tears, guarded_edges
 from facewright.bake.fill import feather, hair_stains, solve_fill, surface_distance
+from facewright.bake.grain import grain, grain_strength
 from facewright.bake.mirror import mirrored_corner_uv
+from facewright.bake.nostrils import around_nostrils, darkened, hole_rims, nostril_light
 from facewright.bake.project import project_to_scan
 from facewright.bake.pyramid import push_pull
 from facewright.bake.sample import ScanLooks, sample_pixels
@@ -38,6 +42,7 @@ STRANDS_MM, STRAND_SHARE, STRAND_ROUNDS = 15.0, 0.9, 2
 BROWS_MM = 32.0  # from eyes, lips and nostrils
 SPECK_MM = 6.0
 HAIR_TEXEL_MM = 2.0  # hair's colour is that of a lock, not of a strand
+DETAIL_STRIDE = 31
 DEFAULT_SKIN = (0.60, 0.42, 0.34)
 
 
@@ -85,14 +90,15 @@ def bake(scan, face, options=None, jobs=1):
     wanted = can_see & _observed(skin, texels, jobs)
     rays = vertex_normals(skin.V, skin.F[skin.outer_faces])
     hits = project_to_scan(scan, skin.V, skin.F, rays, texels, wanted, options.max_distance_mm, jobs)
-    colors, colored, bends, met = _look(scan, skin, texels, hits, options.size, jobs)
+    colors, colored, beside, bends, met = _look(scan, skin, texels, hits, options.size, jobs)
 
-    geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
-    geometry_weight = feather(skin.V, skin.F, skin.outer, geometry_share)
     has_color = bool(colored.any())
-    colored, fill = _filled(scan, face, skin, texels, colors, colored, can_see, jobs)
+    colored, fill, rims = _filled(scan, face, skin, texels, colors, colored, can_see & ~beside, jobs)
+    geometry_share = gather_at_vertices(np.empty((len(texels), 0)), met, can_see, texels, skin.F, len(skin.V), jobs)[1]
+    shown, mirror = np.where(rims, 0.0, geometry_share), face.template.mirror[: len(skin.V)]
+    geometry_weight = feather(skin.V, skin.F, skin.outer, shown, mirror)
 
-    albedo = _compose_albedo(face.template, skin, texels, colors, colored, fill, jobs)
+    albedo = _compose_albedo(face, skin, texels, colors, colored, fill, jobs)
     normal = _compose_normal(skin, texels, bends, met, geometry_weight, jobs)
     weight = fill.weight if has_color else geometry_weight
     coverage = _coverage(skin, texels, colored if has_color else met, weight, can_see, jobs)
@@ -162,22 +168,30 @@ def _observed(skin, texels, jobs):
 
 
 def _look(scan, skin, texels, hits, size, jobs):
-    """What the texels see: colours (k, 3) float32, colored (k,), x and y of tangent-space normals (k, 2), met (k,)."""
+    """What the texels see: colours (k, 3) float32, colored (k,), beside (k,) a tear in the scan's picture and so not
+    colored, x and y of tangent-space normals (k, 2), met (k,)."""
     looks = ScanLooks(scan)
+    cuts = find_cuts(looks)
+    guarded, steps = guarded_edges(looks, cuts)
+    tears = find_tears(looks.scan, cuts, steps)
+    if len(cuts.here):
+        looks.guard(guarded)
     texel_mm = (1.0 / np.maximum(texel_densities(skin.V, skin.F, skin.UV, skin.FT, size), 1e-6)).astype(np.float32)
     normals = vertex_normals(skin.V, skin.F)
     tangents, signs = corner_tangents(skin.V, skin.F, normals, skin.UV, skin.FT)
     tangents, signs = tangents.astype(np.float32), signs.astype(np.float32)
     k = len(texels)
     colors, colored = np.zeros((k, 3), np.float32), np.zeros(k, bool)
-    bends, met = np.zeros((k, 2), np.float32), hits.face >= 0
+    bends, met, beside = np.zeros((k, 2), np.float32), hits.face >= 0, np.zeros(k, bool)
     seen = np.flatnonzero(met)
 
     def work(piece):
         at = seen[piece]
         face, barycentric, on_scan = texels.face[at], texels.barycentric[at], hits.face[at]
         spacing = texel_mm[face]
-        colors[at], colored[at] = looks.colors(on_scan, hits.barycentric[at], spacing)
+        colors[at], known = looks.colors(on_scan, hits.barycentric[at], spacing)
+        beside[at] = known & tears.beside(on_scan, hits.barycentric[at])
+        colored[at] = known & ~tears.islands[on_scan] & ~beside[at]
         normal = unit_rows(at_points(normals, skin.F, face, barycentric))
         tangent = unit_rows(at_corners(tangents, face, barycentric))
         direction = looks.normals(on_scan, hits.barycentric[at], spacing)
@@ -186,20 +200,25 @@ def _look(scan, skin, texels, hits, size, jobs):
         bends[at] = unit_rows(bend)[:, :2]
 
     in_chunks(work, len(seen), jobs)
-    return colors, colored, bends, met
+    return colors, colored, beside, bends, met
 
 
 def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
-    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, and the Fill for the others."""
+    """(k,) bool of the texels whose colour is the skin's, not that of hair on it, the Fill for the others, and (n,)
+    bool of the rims of nostrils that are filled too."""
     n = len(skin.V)
     regions = {name: mask[:n] for name, mask in face.regions.items()}
     means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
     bare = ~_bearded(skin.neutral, regions)
     stains = hair_stains(skin.V, skin.F, means, share, skin.hair, _hair_colors(scan, skin), bare)
+    nostrils, mirror = regions.get("nostrils", np.zeros(n, bool)), face.template.mirror[:n]
+    light = nostril_light(skin.neutral, skin.F, nostrils)
+    rims = hole_rims(skin, texels, colors, colored, means, share, nostrils, light)
+    rims |= rims[mirror]
 
     def solved():
-        known, default = np.where(stains, 0.0, share), _default_skin(face.template)
-        return solve_fill(skin.neutral, skin.F, regions, face.template.mirror[:n], skin.outer, means, known, default)
+        known, default = np.where(stains | rims, 0.0, share), _default_skin(face.template)
+        return solve_fill(skin.neutral, skin.F, regions, mirror, skin.outer, means, known, default)
 
     fill = solved()
     beside = bare & (surface_distance(skin.V, skin.F, skin.hair | stains, STRANDS_MM) < STRANDS_MM)
@@ -210,7 +229,8 @@ def _filled(scan, face, skin, texels, colors, colored, can_see, jobs):
         colored = colored & ~strands
         means, share = gather_at_vertices(colors, colored, can_see, texels, skin.F, n, jobs)
         fill = solved()
-    return colored, fill
+    detail = np.where(around_nostrils(skin.neutral, skin.F, nostrils), 0.0, fill.detail)
+    return colored, replace(fill, color=darkened(fill.color, light), detail=detail), rims
 
 
 def _bearded(V, regions):
@@ -239,32 +259,45 @@ def _strands(skin, texels, colors, beside, fill, jobs):
     return _joined(in_chunks(work, len(texels), jobs), (0,), bool)
 
 
-def _compose_albedo(template, skin, texels, colors, colored, fill, jobs):
+def _compose_albedo(face, skin, texels, colors, colored, fill, jobs):
     """(size, size, 3) uint8: the scan's colours, the fill where it has none, gutters."""
+    template, n = face.template, len(skin.V)
+    bare = ~_bearded(skin.neutral, {name: mask[:n] for name, mask in face.regions.items()})
     seen = _spread(texels, colors, colored)
     corner_uv = mirrored_corner_uv(skin.F, template.polygons, template.uv_polygons, template.uv, template.mirror)
     mirrored_face = np.isfinite(corner_uv).all(axis=(1, 2))
     size = texels.size
     result = np.empty((len(texels), 3), np.float32)
+    strength = grain_strength(_details(skin, texels, colors, colored & bare[skin.F].all(axis=1)[texels.face], fill))
+    strength = strength.astype(np.float32)
+    rough, here = bool(strength.any()), skin.outer_faces
+    known = np.column_stack([fill.color, fill.own, fill.weight, fill.detail])
 
     def work(piece):
         face, barycentric = texels.face[piece], texels.barycentric[piece]
+        values = at_points(known, skin.F, face, barycentric)
+        filled, own = values[:, :3], seen[texels.index[piece]] - values[:, 3:6]
         # Faces behind a rim may lie in another chart: what was spread there from seen texels is of other skin.
-        here = skin.outer_faces[face]
-        weight = (at_points(fill.weight, skin.F, face, barycentric) * here)[:, None]
-        own = seen[texels.index[piece]]
-        filled = at_points(fill.color, skin.F, face, barycentric)
-        detail = at_points(fill.detail, skin.F, face, barycentric) * here
-        at = np.flatnonzero((detail > 0) & (weight[:, 0] < 1) & mirrored_face[face])
+        weight, detail = values[:, 6:7] * here[face, None], values[:, 7] * here[face]
+        at = np.flatnonzero((weight[:, 0] < 1) & (detail > 0) & mirrored_face[face])
         uv = at_corners(corner_uv, face[at], barycentric[at])
         other = sample_pixels(seen.reshape(size, size, 3), uv.astype(np.float64) * size)
         other -= at_points(fill.mirrored, skin.F, face[at], barycentric[at])
-        filled[at] += detail[at, None] * other
-        result[piece] = own * weight + filled * (1 - weight)
+        filled[at] += (detail[at, None] * (1 - weight[at])) * other
+        at = np.flatnonzero((weight[:, 0] < 1) & (detail < 1) & here[face] & rough)
+        share = np.sqrt(1 - np.square(weight[at, 0])) * (1 - detail[at])
+        filled[at] += (share * grain(at_points(skin.neutral, skin.F, face[at], barycentric[at])))[:, None] * strength
+        result[piece] = filled + weight * own
 
     in_chunks(work, len(texels), jobs)
     image = _spread(texels, result, np.ones(len(texels), bool), gutters=True)
     return _bytes(image).reshape(size, size, 3)
+
+
+def _details(skin, texels, colors, chosen, fill):
+    """(j, 3) differences of some of the chosen texels (k,) from the scan's low-pass colour, where it is fully seen."""
+    at = np.flatnonzero(chosen & (fill.weight == 1)[skin.F].all(axis=1)[texels.face])[::DETAIL_STRIDE]
+    return colors[at] - at_points(fill.own, skin.F, texels.face[at], texels.barycentric[at])
 
 
 def _compose_normal(skin, texels, bends, met, weight, jobs):

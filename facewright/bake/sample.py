@@ -32,8 +32,8 @@ class ScanLooks:
         if self.mapped:
             uv_unique, uv_faces = _welded(scan.uv, scan.uv_faces)
             self.uv_corners = uv_unique[uv_faces]  # (m, 3, 2)
-            self.seams = _seam_edges(uv_faces)
-            self.seam_corners = _on_seams(uv_faces, self.seams)
+            self.uv_faces = uv_faces
+            self.guard(_seam_edges(uv_faces))
             flat = np.concatenate([uv_unique, np.zeros((len(uv_unique), 1))], axis=1)
             in_uv, on_surface = face_areas(flat, uv_faces), face_areas(scan.vertices, scan.faces)
             self.uv_per_mm = np.sqrt(in_uv / np.maximum(on_surface, 1e-12))  # (m,)
@@ -47,15 +47,23 @@ class ScanLooks:
     def has_color(self):
         return self.scan.has_texture or self.scan.colors is not None
 
-    def colors(self, face, barycentric, texel_mm):
-        """(k, 3) float32 sRGB in 0..255 and (k,) bool: the scan has a colour there. texel_mm (k,): the map's texel."""
+    def guard(self, edges):
+        """From now on keep samples off no other cuts than these edges (m, 3) bool."""
+        self.seams = edges
+        self.seam_corners = _on_seams(self.uv_faces, edges)
+
+    def colors(self, face, barycentric, texel_mm, guard=True):
+        """(k, 3) float32 sRGB in 0..255 and (k,) bool: the scan has a colour there. texel_mm (k,): the map's texel.
+
+        guard: samples are kept off the other side of seams
+        """
         colors = np.zeros((len(face), 3), np.float32)
         if self.scan.has_texture:
             image = self.scan.face_texture[face] if self.scan.face_texture is not None else np.zeros(len(face), int)
             for number, pyramid in enumerate(self.pyramids):
                 chosen = np.flatnonzero(image == number)
                 if len(chosen):
-                    colors[chosen] = self._sample(pyramid, face[chosen], barycentric[chosen], texel_mm[chosen])
+                    colors[chosen] = self._sample(pyramid, face[chosen], barycentric[chosen], texel_mm[chosen], guard)
             return colors, image >= 0
         if self.scan.colors is not None:
             colors = at_points(self.scan.colors * 255.0, self.scan.faces, face, barycentric)
@@ -71,7 +79,7 @@ class ScanLooks:
         tangents = unit_rows(at_corners(self.tangents, face, barycentric))
         return from_tangent_space(texture, normals, tangents, self.signs[face].astype(np.float32))
 
-    def _sample(self, pyramid, face, barycentric, texel_mm):
+    def _sample(self, pyramid, face, barycentric, texel_mm, guard=True):
         """(k, c) float32 of an image pyramid, each sample from the level that suits its texel."""
         height, width = pyramid[0].shape[:2]
         ratio = self.uv_per_mm[face] * np.sqrt(height * width) * texel_mm
@@ -82,13 +90,16 @@ class ScanLooks:
             with self._growing:  # two threads that want the same level would both append it
                 image = _pyramid_level(pyramid, number)
             scale = np.array(image.shape[1::-1], float)
-            xy = self._pixels(face[chosen], barycentric[chosen], scale)
+            xy = self._pixels(face[chosen], barycentric[chosen], scale, guard)
             result[chosen] = sample_pixels(image, xy)
         return result
 
-    def _pixels(self, face, barycentric, scale):
-        """(k, 2) positions in texels of an image of size scale (width, height), v up, kept off the seams."""
+    def _pixels(self, face, barycentric, scale, guard):
+        """(k, 2) positions in texels of an image of size scale (width, height), v up, kept off the seams
+        that are guarded."""
         xy = at_corners(self.uv_corners, face, barycentric).astype(np.float64) * scale
+        if not guard:
+            return xy
         near = np.flatnonzero(self.seam_corners[face].any(1))
         corners = self.uv_corners[face[near]] * scale  # (k, 3, 2)
         at_seam, along_seam = self.seam_corners[face[near]], self.seams[face[near]]

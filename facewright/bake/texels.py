@@ -31,6 +31,10 @@ class Texels:
     def __len__(self):
         return len(self.index)
 
+    def chosen(self, which):
+        """The Texels at which, (j,) indices."""
+        return Texels(self.size, self.index[which], self.face[which], self.barycentric[which])
+
 
 def in_chunks(work, n, jobs=1, chunk=CHUNK):
     """work(slice) over 0..n in pieces, in order; jobs is the number of threads. Returns the list of results."""

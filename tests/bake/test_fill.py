@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from facewright.bake.fill import FORGET_MM, feather, hair_stains, solve_fill, surface_distance
-from facewright.mesh.adjacency import dilate
+from facewright.bake.fill import BAND_MM, FORGET_MM, feather, hair_stains, solve_fill, surface_distance
+from facewright.mesh.adjacency import dilate, unique_edges
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +30,9 @@ def test_distance_along_the_surface(ball):
 
 
 def test_feather_is_zero_at_holes_and_one_away_from_them_and_at_rims(ball):
-    V, F, _, regions = ball
+    V, F, mirror, regions = ball
     share = np.where(V[:, 0] > 40, 0.0, 1.0)
-    weight = feather(V, F, regions["outer"], share)
+    weight = feather(V, F, regions["outer"], share, mirror)
     assert (weight[V[:, 0] > 40] == 0).all()
     assert (weight[(V[:, 0] < 30) & regions["outer"]] == 1).all(), "the mouth's rim is not a hole"
     assert (weight[regions["mouth_interior"]] == 0).all()
@@ -136,3 +136,25 @@ def test_what_the_other_side_shows_beside_the_unknown_is_not_repeated(ball):
     assert strip.sum() > 10
     assert fill.color[strip].max() < 150
     assert (fill.detail[strip] == 0).all()
+
+
+def test_the_end_of_what_both_sides_show_is_eased_over_a_wide_band(ball):
+    """A dark border (a beard) of what is shown fades into the skin, detail fades out; farther in nothing changes."""
+    V, F, mirror, _ = ball
+    outer, height = np.ones(len(V), bool), V[:, 2]
+    arc = 80 * np.arcsin(np.clip(height / 80, -1, 1))
+    shown = arc > 0
+    colors = np.where((shown & (arc < 7))[:, None], 60.0, 160.0) * np.ones(3)
+    fill = solve_fill(V, F, {}, mirror, outer, colors, shown.astype(float), (1, 2, 3))
+    inside, band = arc > BAND_MM + 8, shown & (arc < 0.7 * BAND_MM)
+    np.testing.assert_array_equal(fill.weight[inside], 1.0)
+    np.testing.assert_allclose(fill.color[inside], colors[inside], atol=1e-6)
+    assert (fill.weight[band] < 1).all()
+    np.testing.assert_array_equal(fill.own[shown], colors[shown])
+    edges = unique_edges(F)
+    across = np.abs(np.diff(colors[edges, 0])[:, 0]) > 0
+    assert np.abs(np.diff(fill.color[edges, 0])[across]).mean() < 0.5 * 100
+    assert fill.color[shown & (arc < 7), 0].mean() > 75
+    one_sided = shown | (V[:, 0] > 0)
+    narrow = solve_fill(V, F, {}, mirror, outer, colors, one_sided.astype(float), (1, 2, 3))
+    assert (narrow.weight[arc > 8] == 1).all(), "the other side shows what lies beyond"

@@ -142,3 +142,24 @@ def test_threads_change_nothing_and_inputs_stay(ball_face, ball_scan):
     for name in one:
         np.testing.assert_array_equal(one[name], two[name])
     np.testing.assert_array_equal(scan.vertices, before)
+
+
+def test_a_hole_that_the_scan_shows_beside_the_nostril_is_filled(ball_face, ball_scan, texels, monkeypatch):
+    monkeypatch.setattr("facewright.bake.nostrils.AROUND_MM", 15.0)  # two of the ball's long edges
+    nostrils = ball_face.regions["mouth_interior"]
+    eyes = np.abs(ball_face.vertices[:, 1] - 30) < 5
+    regions = ball_face.regions | {"nostrils": nostrils, "mouth_interior": nostrils & False, "eyes": eyes}
+    face = Face(**{**vars(ball_face), "regions": regions})
+
+    def at_hole(directions, mm):
+        return (np.linalg.norm(80 * directions[:, :2] - [0, -35], axis=1) < mm) & (directions[:, 2] > 0)
+
+    maps = bake(ball_scan(lambda d: np.where(at_hole(d, 17.0)[:, None], 0.1, [[0.7, 0.5, 0.4]])), face, SIZE)
+    directions, coverage = directions_of(texels, face), at(maps, "coverage", texels)[:, 0]
+    light = at(maps, "albedo", texels)[:, 0] / (255 * 0.7)
+    rim = at_hole(directions, 17.0) & (coverage != INSIDE)
+    assert (coverage[rim] == FILLED).mean() > 0.95
+    assert np.percentile(light[rim], 5) > 0.8
+    deep = at_hole(directions, 6.0)
+    assert light[deep].max() < 0.6 and (coverage[deep] == INSIDE).all()
+    assert (coverage[~at_hole(directions, 38.0)] == SEEN).all()
