@@ -20,12 +20,15 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from facewright.blending import all_blends
 from facewright.contact.targets import is_even
+from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR
 from facewright.expand import expand_weights
 from facewright.mesh.adjacency import dilate, face_components, touching
-from facewright.mesh.folds import expected_normals, least_turn
+from facewright.mesh.folds import expected_normals, folded_by_shape, least_turn
+from facewright.mesh.intersect import intersections_of
 from facewright.mesh.normals import cross, dot, face_corners, face_cross, lengths, max_norms, normalized
 from facewright.solve.least_motion import least_motion
 from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
@@ -34,6 +37,8 @@ from facewright.working_set import read_working_set
 _ON_WAY, _FINE = (0.4, 0.75, 1.0), (0.2, 0.35, 0.5, 0.6, 0.75, 0.85, 0.93, 1.0)  # weights of shapes, with in-betweens
 _LIDS, _LOOKS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.35, 0.65, 1.0)  # weights of a blink, and of the looks with it
 _BOTH = (1.0, 1.0), (0.83, 0.83), (0.65, 0.65), (0.9, 0.5), (0.5, 0.9)  # weights of two shapes with a corrective
+_AROUND_MM = 8.0  # from a face that is opened: what it may come to cross
+_BLINKS = "eyeBlinkLeft", "eyeBlinkRight"
 _DIRECTIONS = (("Up",), ("Down",), ("In",), ("Out",), ("In", "Up"), ("In", "Down"), ("Out", "Up"), ("Out", "Down"))
 _SUSPECT = 0.5  # of its area at rest, seen as it should look: less of a face in one shape makes it suspect
 _EVERY = 2  # pose of the sample in which they are asked whether they are at risk
@@ -61,7 +66,17 @@ def lay_blends_flat(face, targets):
     touched = dilate(touched, skin.faces)
     ease = skin.ease * touched
     patches = [skin.faces_of(patch) for patch in skin.patches(np.flatnonzero(touching(touched, skin.faces)))]
-    changes = [(patch, patch.opened(weights, risk[patch.asked], ease[patch.used])) for patch in patches]
+    plain = skin.weights(_plain_poses(targets))
+
+    def opened(patch):
+        """What opens the faces of a patch and makes nothing cross where no blends play; else without the lids' own."""
+        for may_change in (np.ones(len(patch.played), bool), ~skin.held[patch.played]):
+            change = patch.opened(weights, risk[patch.asked], may_change[:, None] * ease[patch.used])
+            if not change.any() or skin.stays_sound(patch, change, plain):
+                return change
+        return np.zeros_like(patch.deltas)
+
+    changes = [(patch, opened(patch)) for patch in patches]
     result = skin.changed(changes)
     return result.evened(face.template.mirror) if changes and is_even(face) else result
 
@@ -86,6 +101,18 @@ def sample_poses(targets):
     return [{name: weight for name, weight in pose.items() if name in known} for pose in poses]
 
 
+def _plain_poses(targets):
+    """list of {shape: weight}: each shape, and the pairs that lids and lips must survive, as they are at the end."""
+    known, poses = set(targets.names), []
+    for names in _together(targets.names):
+        bases = {CORRECTIVE_BASE[name]: 1.0 for name in names if CORRECTIVE_BASE.get(name) in known}
+        poses.append(dict.fromkeys(names, 1.0) | bases)
+    for pair in (*EYE_PAIRS, *MOUTH_PAIRS, TONGUE_PAIR):
+        sided = {name + side for name in pair for side in ("", "Left", "Right")}
+        poses.append(dict.fromkeys(sorted(sided & known), 1.0))
+    return poses
+
+
 def _together(names):
     """Tuples of shapes that can be asked at once: the two eyes are far from each other, all else stands alone."""
     right = {name.removesuffix("Left") + "Right" for name in names if name.startswith("eye") and name.endswith("Left")}
@@ -107,6 +134,9 @@ class _Skin:
         self.faces = even_handed(self.all_faces[~inner[self.all_faces].any(axis=1)], face.template.mirror)[0]
         self.names = [*targets.names, *targets.extras]
         self.deltas = [targets.delta(name)[self.at] for name in self.names]
+        # Shut lids lie a hundredth of a millimetre apart, and what has brought them there is hard to change.
+        shut = {name: drivers for name, drivers in targets.correctives.items() if set(drivers) & set(_BLINKS)}
+        self.held = np.isin(self.names, [*_BLINKS, *shut, *(driver for pair in shut.values() for driver in pair)])
         self.ease = np.ones(len(self.V))
         for name, line in face.lines.items():
             if name.startswith("lip_seam"):
@@ -168,6 +198,30 @@ class _Skin:
         played = np.flatnonzero(np.abs(deltas).max(axis=(1, 2)) > _STILL_MM)
         faces = np.searchsorted(used, self.faces[asked])
         return _Faces(asked, used, played, self.V[used], deltas[played], faces, local.reshape(-1, 3))
+
+    def stays_sound(self, patch, change, weights):
+        """Whether a change (t, n, 3) of a patch's deltas lets nothing more cross or fold around it in any of the poses
+        of all targets' weights (p, s)."""
+        moving = patch.played[change.any(axis=(1, 2))]
+        near = cKDTree(self.V[patch.used]).query(self.V, distance_upper_bound=_AROUND_MM)[0] < _AROUND_MM
+        used, faces = np.unique(self.all_faces[touching(near, self.all_faces)], return_inverse=True)
+        faces, place = np.ascontiguousarray(faces.reshape(-1, 3)), np.searchsorted(used, patch.used)
+        deltas = np.array([delta.take(used, axis=0) for delta in self.deltas])
+        rest, moved = self.V[used], np.zeros(len(used), bool)
+        moved[place] = change.any(axis=(0, 2))
+        touched = touching(moved, faces)
+
+        def faults(pose):
+            return len(intersections_of(pose, faces, touched)) + len(folded_by_shape(rest, pose, faces, touched))
+
+        for row in weights[weights[:, moving].any(axis=1)]:
+            before = rest + np.tensordot(row, deltas, 1)
+            after = before.copy()
+            after[place] += np.tensordot(row[patch.played], change, 1)
+            left = faults(after)
+            if left and left > faults(before):
+                return False
+        return True
 
     def changed(self, changes):
         """The Targets with changes [(_Faces, (t, n, 3) of the deltas of its vertices)]."""
@@ -255,7 +309,7 @@ class _Faces:
         """(t, n, 3) changes of the deltas that keep faces open in poses of all targets' weights (p, s).
 
         risk (k,) bool: faces at risk, which are to stay well open; the others stay as open as they are, or nearly so.
-        ease (n,) 0..1: how readily a vertex gives way. The least faults of some rounds
+        ease 0..1: how readily a vertex (n,), or it in each target (t, n), gives way. The least faults of some rounds
         """
         weights = self._moving(weights)
         along, turn, _ = self._look(weights)
