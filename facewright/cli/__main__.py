@@ -83,6 +83,8 @@ def main(arguments=None):
     except OSError as error:
         if sys.stdout is sys.__stdout__:  # a reader that is gone, a full disk: nothing more can be said there
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):  # `| head` has seen enough
+            return 0
         where = f"{error.filename}: " if error.filename else ""
         print(f"facewright: {where}cannot be read or written ({error.strerror or error})", file=sys.stderr)
         return 2

@@ -124,6 +124,9 @@ def print_rows(rows):
         print("  ".join([*names, *cells, "" if row.met else "missed"]).rstrip())
     judged = [row for row in rows if row.has_bar]
     print(f"{sum(row.met for row in judged)} of {len(judged)} bars met")
+    for row in judged:
+        if not row.met:
+            print(f"missed: {row.group}, {row.pose}, {row.figure}: {_number(row.full)} (bar {_range(row.bar)})")
 
 
 def _number(value):

@@ -36,11 +36,13 @@ def run(options):
     from facewright.scan.landmark_files import NAMED
     from facewright.write.landmarks import draw_landmarks
 
+    out = Path(options.out)
+    picture = out.with_suffix(".png")
+    if out == picture or out.is_dir():
+        raise InputError(f"{out}: points are written as JSON with a picture beside it; give --out a name like p.json")
     scan, _ = clean_scan(read_scan(options.scan, albedo=options.albedo, unit=options.units))
     found = find_landmarks(scan, LandmarkOptions(options.up, options.units, options.mirror))
     names = None if options.all else {f"mp{number}": name for name, number in NAMED.items()}
-    out = Path(options.out)
-    picture = out.with_suffix(".png")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_landmarks(out, found.landmarks, found.scan, names=names)

@@ -132,10 +132,12 @@ def eye_rows(rig):
     for name, turn in found["turn_deg"].items():
         bar = (LOOKS[name] - TURN_BAR_DEG, LOOKS[name] + TURN_BAR_DEG)
         rows.append(Row("eyes", name, "ball turns deg", turn, bar=bar))
-    bars = {"bar": (None, SWELL_BAR), "plain_bar": (None, PLAIN_SWELL_BAR)}
+    # Without in-betweens and correctives there is only the plain way, which is judged as such.
+    plays_on = bool(rig.in_betweens or rig.correctives)
+    bars = {"bar": (None, SWELL_BAR if plays_on else PLAIN_SWELL_BAR), "plain_bar": (None, PLAIN_SWELL_BAR)}
     rows.append(Row("eyes", "looks on their way", "radius changes by", *found["swell"], **bars))
-    bar = (None, SWELL_BAR)
-    rows.append(Row("eyes", "diagonal looks on their way", "radius changes by", *found["swell_diagonal"], bar=bar))
+    bar = {"bar": (None, SWELL_BAR)} if plays_on else {}
+    rows.append(Row("eyes", "diagonal looks on their way", "radius changes by", *found["swell_diagonal"], **bar))
     return rows
 
 

@@ -34,6 +34,10 @@ NAMED = {
 }
 
 
+OFF_MM = 12.0
+"""A point so far from the surface is a slip: other units, another scan, a digit too many."""
+
+
 def landmark_index(name):
     """MediaPipe's number of a landmark name; None for an unknown one."""
     if name in NAMED:
@@ -103,6 +107,7 @@ def place_landmarks(landmarks, overrides, scan):
     """Landmarks with those of overrides put where the user says, at the nearest point of the surface, weight 1.
 
     overrides dict name -> (3,) point in file coordinates or (face, barycentric); scan in our frame
+    raises InputError where a point lies far from the surface, or a left one to the right of its twin
     """
     if not overrides:
         return landmarks
@@ -120,6 +125,25 @@ def place_landmarks(landmarks, overrides, scan):
             faces[index], barycentric[index] = value
         else:
             nearest = surface.closest((T[:3, :3] @ value + T[:3, 3])[None])
+            if nearest.distance[0] > OFF_MM:
+                raise InputError(
+                    f"landmark {name!r} lies {nearest.distance[0]:.0f} mm from the scan; give it in the scan file's "
+                    "own coordinates and units"
+                )
             faces[index], barycentric[index] = nearest.faces[0], nearest.barycentric[0]
         weights[index] = 1.0
-    return Landmarks(landmarks.names, faces, barycentric, weights)
+    placed = Landmarks(landmarks.names, faces, barycentric, weights)
+    x = np.where(weights > 0.0, placed.positions(scan.vertices, scan.faces)[:, 0], np.nan)
+    _check_sides(x, {landmark_index(name) for name in overrides})
+    return placed
+
+
+def _check_sides(x, moved):
+    """Raise InputError where a left point lies to the right of its twin; x (478,) to the person's left, nan where it is
+    not known; moved: the numbers of points placed by hand."""
+    for left, index in NAMED.items():
+        right = left.replace("_left", "_right")
+        if right != left and {index, NAMED[right]} & moved and x[index] < x[NAMED[right]]:
+            raise InputError(
+                f"landmark {left!r} lies to the right of {right!r}; left is the person's own left, so swap the two"
+            )

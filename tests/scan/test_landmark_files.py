@@ -20,7 +20,12 @@ def landmarks_on_wall():
     rng = np.random.default_rng(0)
     barycentric = rng.dirichlet(np.ones(3), 478)
     weights = np.where(np.arange(478) % 2, 0.5, 0.0)
-    return wall, Landmarks(LANDMARK_NAMES, rng.integers(0, 2, 478), barycentric, weights)
+    faces = rng.integers(0, 2, 478)
+    for left, index in NAMED.items():  # of the wall's middle
+        if left.endswith("_left"):
+            faces[[index, NAMED[left[:-4] + "right"]]] = 0, 1
+            barycentric[[index, NAMED[left[:-4] + "right"]]] = [0, 0.8, 0.2], [0.2, 0.2, 0.6]
+    return wall, Landmarks(LANDMARK_NAMES, faces, barycentric, weights)
 
 
 def test_round_trip(tmp_path, landmarks_on_wall):
@@ -82,6 +87,17 @@ def test_bad_files(tmp_path, text, word):
         read_landmarks(tmp_path / "a.json")
     with pytest.raises(InputError, match="does not exist"):
         read_landmarks(tmp_path / "b.json")
+
+
+def test_slips_of_the_hand_are_named(landmarks_on_wall):
+    """A point in other units, and left for right, as one who looks at the face would have it."""
+    wall, landmarks = landmarks_on_wall
+    with pytest.raises(InputError, match="'nose_tip' lies 45 mm from the scan"):
+        place_landmarks(landmarks, {"nose_tip": np.array([5.0, 6.0, 90.0])}, wall)
+    left, right = np.array([17.0, 6.0, 0.0]), np.array([3.0, 6.0, 0.0])
+    place_landmarks(landmarks, {"mouth_corner_left": left, "mouth_corner_right": right}, wall)
+    with pytest.raises(InputError, match="'mouth_corner_left' lies to the right of 'mouth_corner_right'"):
+        place_landmarks(landmarks, {"mouth_corner_left": right, "mouth_corner_right": left}, wall)
 
 
 def test_face_that_is_not_there(landmarks_on_wall):
