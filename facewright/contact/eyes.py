@@ -46,7 +46,7 @@ class EyeShapeOptions:
 
     lids: LidMotionOptions = field(default_factory=LidMotionOptions)
     look_turn_deg: dict[str, tuple[float, float]] = field(
-        default_factory=lambda: {"Down": (-23.0, -10.0), "Up": (16.0, 5.0), "In": (0.0, 0.0), "Out": (0.0, 0.0)}
+        default_factory=lambda: {"Down": (-21.0, -10.0), "Up": (16.0, 5.0), "In": (0.0, 0.0), "Out": (0.0, 0.0)}
     )
     wide_turn_deg: tuple[float, float] = (12.0, -4.0)
     squint_share: tuple[float, float] = (0.10, 0.30)
