@@ -22,9 +22,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from facewright.blending import all_blends
+from facewright.contact.blend_poses import plain_poses, sample_poses, together
 from facewright.contact.targets import is_even
-from facewright.conventions import EYE_PAIRS, MOUTH_PAIRS, TONGUE_PAIR
 from facewright.expand import expand_weights
 from facewright.mesh.adjacency import dilate, face_components, touching
 from facewright.mesh.folds import expected_normals, folded_by_shape, least_turn
@@ -32,14 +31,9 @@ from facewright.mesh.intersect import intersections_of
 from facewright.mesh.normals import cross, dot, face_corners, face_cross, lengths, max_norms, normalized
 from facewright.solve.least_motion import least_motion
 from facewright.transfer.shapes import CORRECTIVE_BASE, even_handed
-from facewright.working_set import read_working_set
 
-_ON_WAY, _FINE = (0.4, 0.75, 1.0), (0.2, 0.35, 0.5, 0.6, 0.75, 0.85, 0.93, 1.0)  # weights of shapes, with in-betweens
-_LIDS, _LOOKS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.35, 0.65, 1.0)  # weights of a blink, and of the looks with it
-_BOTH = (1.0, 1.0), (0.83, 0.83), (0.65, 0.65), (0.9, 0.5), (0.5, 0.9)  # weights of two shapes with a corrective
 _AROUND_MM = 8.0  # from a face that is opened: what it may come to cross
 _BLINKS = "eyeBlinkLeft", "eyeBlinkRight"
-_DIRECTIONS = (("Up",), ("Down",), ("In",), ("Out",), ("In", "Up"), ("In", "Down"), ("Out", "Up"), ("Out", "Down"))
 _SUSPECT = 0.5  # of its area at rest, seen as it should look: less of a face in one shape makes it suspect
 _EVERY = 2  # pose of the sample in which they are asked whether they are at risk
 _SOUND = 0.25, 0.45  # the same, and cosine, from which on a face is not asked more closely
@@ -66,11 +60,12 @@ def lay_blends_flat(face, targets):
     touched = dilate(touched, skin.faces)
     ease = skin.ease * touched
     patches = [skin.faces_of(patch) for patch in skin.patches(np.flatnonzero(touching(touched, skin.faces)))]
-    plain = skin.weights(_plain_poses(targets))
+    plain = skin.weights(plain_poses(targets))
 
     def opened(patch):
         """What opens the faces of a patch and makes nothing cross where no blends play; else without the lids' own."""
-        for may_change in (np.ones(len(patch.played), bool), ~skin.held[patch.played]):
+        held = skin.held[patch.played]
+        for may_change in (np.ones(len(held), bool), ~held)[: 1 + held.any()]:
             change = patch.opened(weights, risk[patch.asked], may_change[:, None] * ease[patch.used])
             if not change.any() or skin.stays_sound(patch, change, plain):
                 return change
@@ -79,47 +74,6 @@ def lay_blends_flat(face, targets):
     changes = [(patch, opened(patch)) for patch in patches]
     result = skin.changed(changes)
     return result.evened(face.template.mirror) if changes and is_even(face) else result
-
-
-def sample_poses(targets):
-    """list of {shape: weight}: shapes on their way, looks with lids half shut, blends of the working set."""
-    poses = []
-    for names in _together(targets.names):
-        for weight in _FINE if names[0] in targets.in_betweens else _ON_WAY:
-            bases = {CORRECTIVE_BASE[name]: weight for name in names if CORRECTIVE_BASE.get(name) in targets.names}
-            poses.append(dict.fromkeys(names, weight) | bases)
-    for blink in _LIDS:
-        for looks in _DIRECTIONS:
-            for look in _LOOKS:
-                weights = {"eyeBlink": blink} | {f"eyeLook{direction}": look for direction in looks}
-                poses.append({name + side: w for name, w in weights.items() for side in ("Left", "Right")})
-    for drivers in targets.correctives.values():
-        poses += [dict(zip(drivers, weights)) for weights in _BOTH if not drivers[0].startswith("eye")]
-    words = read_working_set()
-    poses += all_blends(words.expressions, words.visemes)
-    known = set(targets.names)
-    return [{name: weight for name, weight in pose.items() if name in known} for pose in poses]
-
-
-def _plain_poses(targets):
-    """list of {shape: weight}: each shape, and the pairs that lids and lips must survive, as they are at the end."""
-    known, poses = set(targets.names), []
-    for names in _together(targets.names):
-        bases = {CORRECTIVE_BASE[name]: 1.0 for name in names if CORRECTIVE_BASE.get(name) in known}
-        poses.append(dict.fromkeys(names, 1.0) | bases)
-    for pair in (*EYE_PAIRS, *MOUTH_PAIRS, TONGUE_PAIR):
-        sided = {name + side for name in pair for side in ("", "Left", "Right")}
-        poses.append(dict.fromkeys(sorted(sided & known), 1.0))
-    return poses
-
-
-def _together(names):
-    """Tuples of shapes that can be asked at once: the two eyes are far from each other, all else stands alone."""
-    right = {name.removesuffix("Left") + "Right" for name in names if name.startswith("eye") and name.endswith("Left")}
-    for name in names:
-        other = name.removesuffix("Left") + "Right"
-        if name not in right:
-            yield (name, other) if other in right and other in names else (name,)
 
 
 class _Skin:
@@ -174,7 +128,7 @@ class _Skin:
     def _stops(self):
         """(n, 3) motions of the skin by each shape and each in-between, both eyes at once."""
         motion = dict(zip(self.names, self.deltas))
-        for names in _together(self.targets.names):
+        for names in together(self.targets.names):
             base = [motion[CORRECTIVE_BASE[name]] for name in names if CORRECTIVE_BASE.get(name) in motion]
             steps = [sorted(self.targets.in_betweens.get(name, {}).items()) for name in names]
             for stop in zip(*([*(target for _, target in own), name] for own, name in zip(steps, names))):

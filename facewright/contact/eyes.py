@@ -57,7 +57,9 @@ class EyeShapeOptions:
 def solve_eyes(face, deltas, options=None):
     """Targets of a Face with its parts in place from its transferred shapes (s, n, 3) mm; eye shapes made anew."""
     eyes = EyeShapes(face, options)
-    return eyes.with_pairs(eyes.shapes(deltas))
+    made = eyes.with_pairs(eyes.shapes(deltas))
+    # A lining that just clears a lid may be pushed on one side and not on the other.
+    return made.evened(face.template.mirror) if is_even(face) else made
 
 
 class EyeShapes:
@@ -101,9 +103,7 @@ class EyeShapes:
                 target = corrective_name((eye.blink, other))
                 extras[target] = eye.corrective(targets.delta(eye.blink), targets.delta(other), other)
                 correctives[target] = (eye.blink, other)
-        made = replace(targets, extras=extras, correctives=correctives)
-        # A lining that just clears a lid may be pushed on one side and not on the other.
-        return made.evened(self.face.template.mirror) if is_even(self.face) else made
+        return replace(targets, extras=extras, correctives=correctives)
 
 
 class _Eye:

@@ -133,11 +133,11 @@ def eye_rows(rig):
         bar = (LOOKS[name] - TURN_BAR_DEG, LOOKS[name] + TURN_BAR_DEG)
         rows.append(Row("eyes", name, "ball turns deg", turn, bar=bar))
     # Without in-betweens and correctives there is only the plain way, which is judged as such.
-    plays_on = bool(rig.in_betweens or rig.correctives)
-    bars = {"bar": (None, SWELL_BAR if plays_on else PLAIN_SWELL_BAR), "plain_bar": (None, PLAIN_SWELL_BAR)}
+    most = SWELL_BAR if rig.in_betweens or rig.correctives else PLAIN_SWELL_BAR
+    bars = {"bar": (None, most), "plain_bar": (None, PLAIN_SWELL_BAR)}
     rows.append(Row("eyes", "looks on their way", "radius changes by", *found["swell"], **bars))
-    bar = {"bar": (None, SWELL_BAR)} if plays_on else {}
-    rows.append(Row("eyes", "diagonal looks on their way", "radius changes by", *found["swell_diagonal"], **bar))
+    bar = (None, most)
+    rows.append(Row("eyes", "diagonal looks on their way", "radius changes by", *found["swell_diagonal"], bar=bar))
     return rows
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from facewright.contact import Targets, lay_blends_flat
-from facewright.contact.blended import _Skin, sample_poses
+from facewright.contact.blend_poses import sample_poses
+from facewright.contact.blended import _Skin
 from facewright.mesh.folds import expected_normals, folded_by_shape
 from facewright.mesh.normals import face_cross
 
