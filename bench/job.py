@@ -3,7 +3,8 @@
     python bench/job.py [SCAN] [--template hm08] [--texture-size 2048] [--repeat 1]
 
 Runs `facewright rig` in a process of its own into a fresh folder, so that the peak is the job's. Without SCAN: the real
-scan beside the project if it is there, else the embedded sample. Memory is sampled 20 times a second (Linux).
+scan beside the project if it is there, else the embedded sample. Memory is that of both its processes, sampled
+ten times a second (Linux).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from common import SCANS, Verdict, print_table
@@ -32,11 +34,15 @@ def default_scan():
 
 
 def resident_mb(pid):
-    """Resident memory of a process now, MB; None where /proc is not there or the process is gone."""
-    try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    except (OSError, IndexError, ValueError):
+    """Resident memory of a process and its children now, MB; None where /proc is not there or the process is gone."""
+    found = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            after_name = stat.read_text().rpartition(")")[2].split()
+            found[int(stat.parent.name)] = int(after_name[1]), int(after_name[21])
+    if pid not in found:
         return None
+    pages = found[pid][1] + sum(own for parent, own in found.values() if parent == pid)
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
@@ -51,7 +57,7 @@ def run_job(scan, template, texture_size, out):
         memory = resident_mb(process.pid)
         if memory is not None:
             samples.append((time.perf_counter() - began, memory))
-        time.sleep(0.05)
+        time.sleep(0.1)
     seconds = time.perf_counter() - began
     if process.returncode:
         raise SystemExit(f"the job ended with exit code {process.returncode}")

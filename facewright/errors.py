@@ -15,6 +15,10 @@ class StageError(Exception):
 
     def __init__(self, stage, outcome, message, stats=None):
         super().__init__(f"{stage}: {message}")
+        self.message = message
         self.stage = stage
         self.outcome = outcome
         self.stats = dict(stats or {})
+
+    def __reduce__(self):  # from one process to another
+        return type(self), (self.stage, self.outcome, self.message, self.stats)

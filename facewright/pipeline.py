@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from facewright import __version__
 from facewright.bake import BakeOptions, bake, describe_maps
+from facewright.beside import Beside
 from facewright.cache import StageStore, file_digest, fingerprint
 from facewright.contact import Targets
 from facewright.conventions import ARKIT_SHAPES
 from facewright.errors import InputError
 from facewright.evaluate.rig import measure_rig
+from facewright.memory import peak_memory_mb
 from facewright.output import OutputFolder
 from facewright.packing import pack_face, pack_landmarks, pack_scan, unpack_face, unpack_landmarks, unpack_scan
 from facewright.parts import PATTERNS, AssemblyOptions, EyeLook, find_irises
@@ -35,8 +35,8 @@ from facewright.write.credits import write_credits
 from facewright.write.files import PngOnce
 from facewright.write.gltf import write_gltf
 from facewright.write.obj import write_obj
-from facewright.write.preview import write_preview
-from facewright.write.report import build_report, peak_memory_mb, plain, write_json
+from facewright.write.preview import draw_close_ups, write_preview
+from facewright.write.report import build_report, plain, write_json
 from facewright.write.rig import write_rig
 from facewright.write.textures import write_textures
 
@@ -46,11 +46,11 @@ STAGES = ("01-read", "02-landmarks", "03-register", "04-parts", "05-transfer", "
 STAGE_SHARE = {
     "01-read": 0.01,
     "02-landmarks": 0.08,
-    "03-register": 0.20,
-    "04-parts": 0.02,
-    "05-transfer": 0.36,
+    "03-register": 0.21,
+    "04-parts": 0.03,
+    "05-transfer": 0.31,
     "06-bake": 0.01,
-    "07-write": 0.32,
+    "07-write": 0.35,
 }
 
 
@@ -71,7 +71,7 @@ class JobOptions:
     formats       what to write: glb, obj
     shapes        what rig.glb and obj/ carry; "apple": exactly the 52 ARKit shapes; "full": left and right halves in
                   place of their sums, in-betweens ("name@0.5") and pair correctives ("a+b"). rig/ always has all
-    jobs          threads inside the job; the result does not depend on it
+    jobs          cores to use, with two or more in a second process too; the result does not depend on it
     from_stage    run this stage and all after it again, whatever is cached
     """
 
@@ -101,23 +101,6 @@ class JobOptions:
             raise ValueError(f"formats are glb and obj, got {self.formats!r}")
         if self.texture_size < 1 or self.jobs < 1:
             raise ValueError(f"texture_size and jobs are 1 or more, got {self.texture_size} and {self.jobs}")
-
-
-class _Beside:
-    """Work that may be done by a thread of its own while something else goes on, where there is a core for it."""
-
-    def __init__(self, pool, work, jobs):
-        self._pool, self._work, self._jobs = pool, work, jobs
-        self._begun = None
-
-    def begin(self):
-        """Start the work, on half of the threads; one job does one thing at a time."""
-        if self._jobs > 1:
-            self._begun = self._pool.submit(self._work, self._jobs // 2)
-
-    def result(self):
-        """What the work gives, once it is done."""
-        return self._work(self._jobs) if self._begun is None else self._begun.result()
 
 
 class _Run:
@@ -185,28 +168,25 @@ def rig_job(path, out, options=None, progress=None):
     store.sweep()
     run = _Run(store, progress, rerun_from)
     try:
-        # Threads share the work by shapes and pictures. Those of BLAS would only wait for each other: its matrices are
-        # small, and the job took twice the core seconds with them.
-        with threadpool_limits(1, user_api="blas"):
-            return _run_job(run, Path(path), output, options, inputs, placed, template, folder)
+        # Threads of BLAS would only wait for each other: its matrices are small, and the job took twice the core
+        # seconds with them.
+        with threadpool_limits(1, user_api="blas"), Beside(options.jobs) as beside:
+            return _run_job(run, Path(path), output, options, inputs, placed, template, folder, beside)
     except InputError:
         output.remove_what_is_new()
         raise
 
 
-def _run_job(run, path, output, options, inputs, placed, template, folder):
+def _run_job(run, path, output, options, inputs, placed, template, folder, beside):
     scan, clean_stats = _read(run, path, options, inputs)
     scan, landmarks, pose_info = _landmarks(run, scan, options, inputs, placed)
     face = _register(run, scan, landmarks, pose_info["placed"], template, folder, options)
     face = _parts(run, scan, face, template)
-    with ThreadPoolExecutor(1) as beside:
-        baking = _Beside(beside, partial(_baked, scan, face, options), options.jobs)
-        shapes, figures = _transfer(run, face, template, options.jobs, baking)
-        maps = _bake(run, options, baking)
-    report = _write(run, path, scan, face, shapes, figures, maps, (clean_stats, pose_info), output, options)
+    shapes, maps = _shapes_and_maps(run, scan, face, template, options, beside)
+    report = _write(run, path, scan, face, shapes, maps, (clean_stats, pose_info), output, options, beside)
     report["timings_s"] = run.seconds
     report["reused"] = run.reused
-    report["peak_memory_mb"] = peak_memory_mb()
+    report["peak_memory_mb"] = round(peak_memory_mb() + beside.peak_mb, 1)
     report["options"] = plain(asdict(options))
     write_json(report, output.folder / "report.json")
     return report
@@ -263,57 +243,55 @@ def _parts(run, scan, face, template):
     return unpack_face(arrays, info, template)
 
 
-def _transfer(run, face, template, jobs, beside):
-    """Targets and figures of the shapes; beside: the baking, which needs none of this."""
+def _shapes_and_maps(run, scan, face, template, options, beside):
+    """Targets of all shapes, and the baked maps, which need none of these and are made meanwhile."""
+    baking = None
 
-    def work():
-        beside.begin()
-        targets = shapes_of(face, jobs)
-        bare = assembled(face, targets, options=AssemblyOptions(eyes=None, painted=False))
+    def begin_baking():
+        return beside.begin(bake, scan, face, _bake_options(options), max(options.jobs - 1, 1))
+
+    def transfer():
+        nonlocal baking
+        baking = begin_baking()
+        targets = shapes_of(face)
         info = {"names": list(template.shape_names), "extras": list(targets.extras)}
         # Lists: a stage's JSON is written with its keys sorted, and the order of targets must survive a resumed run.
         info["in_betweens"] = [[name, list(map(list, steps.items()))] for name, steps in targets.in_betweens.items()]
         info["correctives"] = [[name, list(drivers)] for name, drivers in targets.correctives.items()]
-        info["figures"] = plain(measure_rig(bare))
         return {"deltas": targets.deltas, "extras": np.array(list(targets.extras.values()))}, info
 
-    arrays, info = run.stage("05-transfer", work, list(ARKIT_SHAPES))
-    targets = Targets(
+    arrays, info = run.stage("05-transfer", transfer, list(ARKIT_SHAPES))
+    maps, _ = run.stage("06-bake", lambda: ((baking or begin_baking()).result(), {}), asdict(_bake_options(options)))
+    return _targets(arrays, info), maps
+
+
+def _targets(arrays, info):
+    return Targets(
         tuple(info["names"]),
         arrays["deltas"],
         dict(zip(info["extras"], arrays["extras"])),
         {name: {float(weight): target for weight, target in steps} for name, steps in info["in_betweens"]},
         {name: tuple(drivers) for name, drivers in info["correctives"]},
     )
-    return targets, info["figures"]
-
-
-def _bake(run, options, baking):
-    bake_options = _bake_options(options)
-    arrays, _ = run.stage("06-bake", lambda: (baking.result(), {}), asdict(bake_options))
-    return arrays
-
-
-def _baked(scan, face, options, jobs):
-    return bake(scan, face, _bake_options(options), jobs)
 
 
 def _bake_options(options):
     return BakeOptions(size=options.texture_size)
 
 
-def _write(run, path, scan, face, shapes, figures, maps, found, output, options):
+def _write(run, path, scan, face, shapes, maps, found, output, options, beside):
     """Write all results but report.json; returns the report without what differs from run to run."""
 
     def work():
+        figures = beside.begin(_figures, face, shapes)
         rig = assembled(face, shapes, maps, AssemblyOptions(eyes=EyeLook(pattern=options.iris)))
         rig = replace(rig, info=rig.info | {"T_rig_to_scan": _rig_to_scan(scan).tolist(), "scan": scan.name})
+        closer = beside.begin(draw_close_ups, rig)
         earlier = run.store.last_info("07-write").get("files", {})
-        with output.workshop() as folder, ThreadPoolExecutor(1) as beside:
-            told = _Beside(beside, lambda jobs: build_report(scan, face, _carried(rig, options), *found), options.jobs)
-            told.begin()
-            write_results(rig, maps, scan, face, folder, options, path.name)
-            report = plain(told.result() | figures)
+        with output.workshop() as folder:
+            report = build_report(scan, face, _carried(rig, options), *found)
+            write_results(rig, maps, scan, face, folder, options, path.name, closer)
+            report = plain(report | figures.result())
             return {}, {"report": report, "files": output.publish(folder, earlier)}
 
     def intact(info):
@@ -324,13 +302,16 @@ def _write(run, path, scan, face, shapes, figures, maps, found, output, options)
     ]
 
 
-def write_results(rig, maps, scan, face, folder, options, title=None):
-    """Every file of a result but report.json and stages/; title is that of the preview."""
-    with ThreadPoolExecutor(1) as pool:
-        files = _Beside(pool, lambda jobs: _write_files(rig, maps, face, folder, options), options.jobs)
-        files.begin()
-        write_preview(rig, scan, face, folder / "preview.png", options.jobs, title)
-        files.result()
+def _figures(face, shapes):
+    """What measure_rig says of a face's shapes; it needs no maps."""
+    return measure_rig(assembled(face, shapes, options=AssemblyOptions(eyes=None, painted=False)))
+
+
+def write_results(rig, maps, scan, face, folder, options, title, closer):
+    """Every file of a result but report.json and stages/; title is that of the preview, closer its close-ups on their
+    way (beside.Beside)."""
+    _write_files(rig, maps, face, folder, options)
+    write_preview(rig, scan, face, folder / "preview.png", title, closer.result)
 
 
 def _write_files(rig, maps, face, folder, options):

@@ -30,19 +30,19 @@ from facewright.parts import build_rig, fit_parts
 from facewright.transfer import keep_within_amplitudes, keep_within_regions, ride_on_lids, transfer_shapes
 
 
-def shapes_of(face, jobs=1):
+def shapes_of(face):
     """All targets of a Face with its parts in place: the template's shapes carried to it, contact solved."""
     carried = keep_within_amplitudes(face, hold_neck(face, keep_within_regions(face, transfer_shapes(face))))
     carried = lay_tongue(face, keep_jaw_within(face, carried))
     eyes = EyeShapes(face)
-    skin = solve_mouth(face, eyes.shapes(carried), jobs=jobs)
-    skin = part_crossings(face, lay_flat(face, skin), jobs, eyes.with_pairs)
+    skin = solve_mouth(face, eyes.shapes(carried))
+    skin = part_crossings(face, lay_flat(face, skin), eyes.with_pairs)
     return _with_riders(face, lay_blends_flat(face, skin))
 
 
-def rig_from_face(face, maps=None, jobs=1):
+def rig_from_face(face, maps=None):
     """The data.Rig of a Face with its parts in place, as the job makes it; maps as bake gives them."""
-    return assembled(face, shapes_of(face, jobs), maps)
+    return assembled(face, shapes_of(face), maps)
 
 
 def unscanned_face(template, vertices):
@@ -56,9 +56,9 @@ def in_place(face, irises=None):
     return clear_lips(part_lips(even_lining(clear_lids(fit_parts(face, irises=irises)))))
 
 
-def template_rig(template, jobs=1):
+def template_rig(template):
     """The data.Rig of a Template's own head, made as a person's is."""
-    return rig_from_face(in_place(unscanned_face(template, template.vertices)), jobs=jobs)
+    return rig_from_face(in_place(unscanned_face(template, template.vertices)))
 
 
 def assembled(face, targets, maps=None, options=None):

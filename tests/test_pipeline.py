@@ -83,7 +83,7 @@ def forbid(monkeypatch):
 def writes_copy(sample_job, monkeypatch):
     """Writing takes the finished job's files: for runs that are about the stages before."""
 
-    def write_results(rig, maps, scan, face, folder, options, title):
+    def write_results(rig, maps, scan, face, folder, options, title, closer):
         names = [path.name for path in sample_job.folder.iterdir() if path.name not in ("stages", "report.json")]
         for name in names:
             source = sample_job.folder / name

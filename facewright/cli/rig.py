@@ -48,7 +48,7 @@ def add_job_arguments(parser):
     )
     parser.add_argument("--shapes", choices=("apple", "full"), default="apple", help=SHAPES_HELP)
     parser.add_argument(
-        "--jobs", type=_jobs, default=2, metavar="N", help="threads (default: 2); the result does not depend on it"
+        "--jobs", type=_jobs, default=2, metavar="N", help="cores to use (default: 2); the result does not depend on it"
     )
     parser.add_argument(
         "--from",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -26,7 +25,7 @@ _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
 _ON_WAY = 0.25, 0.5, 0.75  # weights of shapes with in-betweens at which a correction must not enter the teeth either
 
 
-def part_crossings(face, targets, jobs=1, pairs=None):
+def part_crossings(face, targets, pairs=None):
     """Targets of a data.Face in which no shape, none of its halves and no named pair has crossings of its own.
 
     What crosses in the neutral may go on doing so; where little can be moved a few pairs of faces are left.
@@ -34,9 +33,8 @@ def part_crossings(face, targets, jobs=1, pairs=None):
     pairs  gives Targets whose shapes are sound the correctives that are made from those
     """
     work = _Crossings(face, targets)
-    with ThreadPoolExecutor(jobs) as pool:
-        targets = work.with_shapes(targets, pool.map)
-        targets = work.with_pairs(pairs(targets) if pairs else targets, pool.map)
+    targets = work.with_shapes(targets)
+    targets = work.with_pairs(pairs(targets) if pairs else targets)
     return targets.evened(face.template.mirror) if is_even(face) else targets
 
 
@@ -82,7 +80,7 @@ class _Crossings:
         parting = self.wide if far else self.near
         return parting([head[self.at] for head in heads], acts, ways_out, still, left=left, **known)
 
-    def with_shapes(self, targets, run):
+    def with_shapes(self, targets):
         """Targets whose shapes have no crossings, nor the halves of those that have any."""
         deltas, extras = np.array(targets.deltas), dict(targets.extras)
 
@@ -108,10 +106,9 @@ class _Crossings:
             both = self._apart([sum(motions), *motions], [1.0, *acts], clean=2)
             return [change + act * both for change, act in zip(alone, acts)]
 
-        asked = _with_twins(targets.names)
-        changes = {
-            name: change for names, found in zip(asked, run(fields, asked)) for name, change in zip(names, found)
-        }
+        changes = {}
+        for names in _with_twins(targets.names):
+            changes |= zip(names, fields(names))
         for number, name in enumerate(targets.names):
             # What was asked about with another shape beneath stays with it what it became.
             change = changes[name] - changes.get(CORRECTIVE_BASE.get(name), 0.0)
@@ -120,7 +117,7 @@ class _Crossings:
                 extras[step] = _plus(extras[step], weight * change, self.at)
         return replace(targets, deltas=deltas, extras=extras)
 
-    def with_pairs(self, targets, run):
+    def with_pairs(self, targets):
         """Targets whose named pairs have none."""
         extras = dict(targets.extras)
         windows = [(EYE_PAIRS, self.is_left), ((*MOUTH_PAIRS, TONGUE_PAIR), self.left)]
@@ -132,8 +129,8 @@ class _Crossings:
             left = [self.before.motion(pose)] if set(names) <= set(self.before.correctives) else ()
             return self._apart([targets.motion(pose)], [1.0], left=left)
 
-        asked = [(names, window) for names, window in pairs if names]
-        for (names, window), change in zip(asked, run(field, [names for names, _ in asked])):
+        changes = [(names, window, field(names)) for names, window in pairs if names]
+        for names, window, change in changes:
             shares = (window, 1.0 - window) if len(names) > 1 else (1.0,)
             for name, share in zip(names, shares):
                 extras[name] = _plus(extras[name], share * change, self.at)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -94,13 +93,12 @@ def part_lips(face, options=None):
     return replace(face, vertices=face.vertices + clear)
 
 
-def solve_mouth(face, targets, options=None, jobs=1):
+def solve_mouth(face, targets, options=None):
     """Targets with the shapes of the mouth as this head needs them.
 
     face  data.Face with its parts in place and its lips parted (part_lips); targets from transfer and solve_eyes
-    jobs  threads; the result does not depend on them
     """
-    mouth = _Mouth(face, options or MouthOptions(), jobs)
+    mouth = _Mouth(face, options or MouthOptions())
     result = mouth.with_room(mouth.with_arc(targets))
     result = mouth.with_single_shapes(mouth.with_flat_corners(result))
     result = mouth.with_both_sides(result)
@@ -114,8 +112,8 @@ def solve_mouth(face, targets, options=None, jobs=1):
 class _Mouth:
     """The mouth of one face: lips, teeth, jaw, and a window that tells left from right."""
 
-    def __init__(self, face, options, jobs=1):
-        self.face, self.options, self.jobs = face, options, jobs
+    def __init__(self, face, options):
+        self.face, self.options = face, options
         template = face.template
         self.skin = template.skin.vertex_slice
         self.faces = even_cut(template.faces[template.skin.face_slice], template.mirror, template.vertices[:, 0])
@@ -154,7 +152,7 @@ class _Mouth:
     def with_single_shapes(self, targets):
         """Targets of which each by itself keeps the lips apart on its whole way."""
         names = self._lip_shapes(targets)
-        lacks = self._each(lambda name: self._lack(targets, {name: 1.0}), names)
+        lacks = [self._lack(targets, {name: 1.0}) for name in names]
         for lack, share in zip(lacks, region_shares(self.face, names)):
             lack[self.skin] *= share  # lips that are shut on one side pull at the other corner
         return _added(targets, [(lack, {name: 1.0}) for name, lack in zip(names, lacks)])
@@ -162,7 +160,7 @@ class _Mouth:
     def with_both_sides(self, targets):
         """Targets of which left and right together keep the lips apart too; each side gets its share."""
         pairs = self._both_sides(targets)
-        lacks = self._each(lambda pair: self._lack(targets, dict.fromkeys(pair, 1.0)), pairs)
+        lacks = [self._lack(targets, dict.fromkeys(pair, 1.0)) for pair in pairs]
         return self._added_to_sides(targets, pairs, lacks)
 
     def with_flat_corners(self, targets):
@@ -173,14 +171,9 @@ class _Mouth:
         mobility[np.concatenate(self.seams)] = SEAM_MOBILITY
         deltas = np.array(targets.deltas)
         near = self.faces[(away <= 2.0 * self.options.flat_mm)[self.faces].any(axis=1)]
-
-        def flat(name):
+        for name in self._lip_shapes(targets):
             moved = skin + targets.delta(name)[self.skin]
-            return laid_flat(skin, moved, near, mobility) - moved
-
-        names = self._lip_shapes(targets)
-        for name, change in zip(names, self._each(flat, names)):
-            deltas[targets.names.index(name), self.skin] += change
+            deltas[targets.names.index(name), self.skin] += laid_flat(skin, moved, near, mobility) - moved
         return replace(targets, deltas=deltas)
 
     def with_mouth_close(self, targets):
@@ -215,13 +208,9 @@ class _Mouth:
         extras, correctives = dict(targets.extras), dict(targets.correctives)
         pairs = [[_sides(name, targets.names) for name in pair] for pair in self.options.pairs]
         pairs = [sides for sides in pairs if all(sides)]
-        lacks = self._each(
-            lambda sides: self._lack(
-                targets, _together(sides), weights=(1.0, HALF), acts=_square, spared_mm=self.options.spared_mm
-            ),
-            pairs,
-        )
-        for sides, lack in zip(pairs, lacks):
+        path = {"weights": (1.0, HALF), "acts": _square, "spared_mm": self.options.spared_mm}
+        for sides in pairs:
+            lack = self._lack(targets, _together(sides), **path)
             for drivers, share in self._shared(sides):
                 name = corrective_name(drivers)
                 extras[name], correctives[name] = share * lack, drivers
@@ -244,19 +233,20 @@ class _Mouth:
         if {"mouthClose", "jawOpen"} <= set(targets.names):
             poses["mouthClose"] = {"mouthClose": 1.0, "jawOpen": 1.0}
         deltas, extras = np.array(targets.deltas), dict(targets.extras)
-        for name, push in zip(poses, self._each(tucked, poses.values())):
+        for name, pose in poses.items():
+            push = tucked(pose)
             deltas[targets.names.index(name), self.skin] += push
             for weight, step in targets.in_betweens.get(name, {}).items():
                 extras[step] = np.array(extras[step])
                 extras[step][self.skin] += weight * push
         targets = replace(targets, deltas=deltas, extras=extras)
         pairs = self._both_sides(targets)
-        pushes = self._each(lambda pair: self._of_head(tucked(dict.fromkeys(pair, 1.0))), pairs)
+        pushes = [self._of_head(tucked(dict.fromkeys(pair, 1.0))) for pair in pairs]
         targets = self._added_to_sides(targets, pairs, pushes)
         extras = dict(targets.extras)
         drivers = [names for names in targets.correctives.values() if set(names) <= set(poses)]
-        for names, push in zip(drivers, self._each(lambda names: tucked(dict.fromkeys(names, 1.0)), drivers)):
-            name = corrective_name(names)
+        for names in drivers:
+            name, push = corrective_name(names), tucked(dict.fromkeys(names, 1.0))
             extras[name] = np.array(extras[name])
             extras[name][self.skin] += push
         return replace(targets, extras=extras)
@@ -301,18 +291,12 @@ class _Mouth:
         for name in names:
             targets = self._corrected(targets, {name: 1.0}, {name: 1.0}, weights=(1.0,))
         path = {"weights": (HALF, 0.5 * HALF, 1.5 * HALF), "acts": _hat}
-        lacks = self._each(lambda name: self._lack(targets, {name: 1.0}, **path), names)
         extras, in_betweens = dict(targets.extras), dict(targets.in_betweens)
-        for name, lack in zip(names, lacks):
-            half = in_between_name(name, HALF)
+        for name in names:
+            lack, half = self._lack(targets, {name: 1.0}, **path), in_between_name(name, HALF)
             extras[half] = HALF * targets.delta(name) + lack
             in_betweens[name] = {HALF: half}
         return replace(targets, extras=extras, in_betweens=in_betweens)
-
-    def _each(self, work, items):
-        """Results of work on independent items, in order, by as many threads as there are jobs."""
-        with ThreadPoolExecutor(self.jobs) as pool:
-            return list(pool.map(work, items))
 
     def _shared(self, sides):
         """(drivers, share (n, 1) or 1) of the correctives of a pair; each shape is given by one name or two sides."""

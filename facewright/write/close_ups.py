@@ -33,10 +33,10 @@ def close_up_poses(rig):
     return sorted_out
 
 
-def close_up_sections(rig, puppet, run=map):
+def close_up_sections(rig, puppet):
     """Sections of a contact sheet; played with in-betweens and correctives where the rig has them.
 
-    puppet  the rig's puppet.Puppet; run  a map, that of a thread pool or the builtin one
+    puppet  the rig's puppet.Puppet
     """
     titles = ("Eyes and brows", "Cheeks and nose", "Mouth and jaw")
     note = "both sides together; pairs last"
@@ -51,7 +51,7 @@ def close_up_sections(rig, puppet, run=map):
             image = puppet.picture({name: share * weight for name, weight in weights.items()}, camera)
             return Cell(image, label if share == 1.0 else f"{label}, {share:g}")
 
-        cells = list(run(cell, jobs))
+        cells = [cell(job) for job in jobs]
         rows = tuple(tuple(cells[i : i + COLUMNS]) for i in range(0, len(cells), COLUMNS))
         if rows:
             sections.append(Section(f"{title}, half way and whole", rows, note))

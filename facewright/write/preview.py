@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from PIL import Image
@@ -31,21 +30,22 @@ HEAT_STOPS = np.array([(38, 52, 92), (46, 132, 140), (236, 212, 110), (206, 58, 
 NOT_SEEN = (88, 88, 94)
 
 
-def write_preview(rig, scan, face, path, jobs=2, title=None):
+def write_preview(rig, scan, face, path, title=None, closer=None):
     """Write a contact sheet of a Rig (data.Rig) made from a Scan through a Face, as PNG.
 
     The whole face is shown under the plain shapes, the close-ups as in-betweens and correctives play them.
 
-    scan   in our frame, as the face was fitted to it; jobs is the number of threads, which changes no pixel
+    scan   in our frame, as the face was fitted to it
     title  over the sheet; default: the scan's name
+    closer gives what draw_close_ups does for the rig, if that is drawn elsewhere; asked for last
     """
-    sheet = preview_sheet(rig, scan, face, jobs, title)
+    sheet = preview_sheet(rig, scan, face, title, closer)
     buffer = io.BytesIO()
     Image.fromarray(sheet).save(buffer, "png", compress_level=3)
     replace_file(path, buffer.getvalue())
 
 
-def preview_sheet(rig, scan, face, jobs=2, title=None):
+def preview_sheet(rig, scan, face, title=None, closer=None):
     """The contact sheet as (h, w, 3) uint8."""
     clay = Puppet(rig)
     scenes = {
@@ -60,21 +60,23 @@ def preview_sheet(rig, scan, face, jobs=2, title=None):
         size = FIT_CLOSE_UP if name == "fit" else CLOSE_UP
         wanted += [(name, view, camera) for view, camera in _close_up_cameras(rig, size).items()]
     shapes, shape_camera = shape_names(rig), _shape_camera(rig)
-    with ThreadPoolExecutor(max(1, jobs)) as pool:
-        rendered = pool.map(lambda job: picture(scenes[job[0]], job[2]), wanted)
-        pictures = {(name, view): image for (name, view, _), image in zip(wanted, rendered)}
-        closer = close_up_sections(rig, clay, pool.map)
-        cells = list(pool.map(lambda name: _shape_cell(clay, name, shapes, shape_camera), (None, *shapes)))
+    pictures = {(name, view): picture(scenes[name], camera) for name, view, camera in wanted}
+    cells = [_shape_cell(clay, name, shapes, shape_camera) for name in (None, *shapes)]
     sections = [
         _neutral_section(pictures, scan),
         _close_up_section(pictures, face),
         _fit_section(pictures),
         _shape_section(cells),
-        *closer,
+        *(closer() if closer else close_up_sections(rig, clay)),
     ]
     triangles = sum(len(mesh.faces) for mesh in rig.meshes)
     subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(shapes)} shapes"
     return compose_sheet(title or scan.name, subtitle, sections)
+
+
+def draw_close_ups(rig):
+    """The close-ups of a preview, a third of its work, for who wants to draw them beside the rest."""
+    return close_up_sections(rig, Puppet(rig))
 
 
 def _neutral_section(pictures, scan):

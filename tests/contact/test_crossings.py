@@ -58,11 +58,6 @@ def test_shapes_that_do_not_cross_are_left_alone(face, targets):
     assert np.array_equal(parted.deltas[2], targets.deltas[2])
 
 
-def test_the_result_does_not_depend_on_threads(face, targets):
-    one, two = (part_crossings(face, targets, jobs) for jobs in (1, 2))
-    assert np.array_equal(one.deltas, two.deltas)
-
-
 def test_pairs_are_made_of_sound_shapes(face, targets):
     seen = []
     part_crossings(face, targets, pairs=lambda sound: seen.append(sound) or sound)

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from facewright import data
-from facewright.write.preview import preview_sheet, write_preview
+from facewright.write.preview import draw_close_ups, preview_sheet, write_preview
 
 
 def ball_rig(face, names=("jawOpen", "mouthClose", "tongueOut")):
@@ -43,7 +43,7 @@ def ball_rig(face, names=("jawOpen", "mouthClose", "tongueOut")):
 
 @pytest.fixture(scope="module")
 def sheet(ball_face, ball_scan):
-    return preview_sheet(ball_rig(ball_face), ball_scan(None), ball_face, jobs=1)
+    return preview_sheet(ball_rig(ball_face), ball_scan(None), ball_face)
 
 
 def test_the_sheet_is_wide_and_shows_something(sheet):
@@ -51,8 +51,9 @@ def test_the_sheet_is_wide_and_shows_something(sheet):
     assert (sheet.reshape(-1, 3).max(axis=1) > 100).mean() > 0.1
 
 
-def test_threads_change_no_pixel(sheet, ball_face, ball_scan):
-    again = preview_sheet(ball_rig(ball_face), ball_scan(None), ball_face, jobs=2)
+def test_close_ups_drawn_beside_the_rest_are_the_same(sheet, ball_face, ball_scan):
+    rig = ball_rig(ball_face)
+    again = preview_sheet(rig, ball_scan(None), ball_face, closer=lambda: draw_close_ups(rig))
     np.testing.assert_array_equal(again, sheet)
 
 
