@@ -1,67 +1,115 @@
 """Work that goes on in a second process, beside what this one does.
 
-Not in a thread: those of one Python share a lock that most of the work here holds, so that two took as long as one.
+Not in a thread: those of one Python share a lock that most of the work here holds, so that two took as long as one. And
+not in a process of a pool: where the first process is killed, the pool's were found to stay for ever. This one reads its
+work from a pipe, and ends with it.
 """
 
 from __future__ import annotations
 
-import multiprocessing
-from concurrent.futures import BrokenExecutor
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
-from loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
 from facewright.memory import peak_memory_mb
+
+_GONE = OSError, EOFError, pickle.UnpicklingError  # what talking to a process that has ended comes to
 
 
 class Beside:
     """A second process, which does one thing after the other, or none: what it would do is done here when it is asked
     for. Results are the same.
 
-    jobs  cores to be used by both processes together; one means that there is no second process
+    jobs     cores to be used by both processes together; one means that there is no second process
+    peak_mb  the most memory that the second process was seen to have taken
     """
 
     def __init__(self, jobs=1):
-        self.jobs, self.peak_mb, self._pool = jobs, 0.0, None
-        # A daemon may have no children, and without shared memory there is no way to talk to one.
-        if jobs > 1 and not multiprocessing.current_process().daemon:
-            with suppress(OSError):
-                self._pool = ProcessPoolExecutor(1)
+        self.peak_mb, self._process, self._ended = 0.0, None, False
+        # A Python within another program may not know its own.
+        self._talking = ThreadPoolExecutor(1) if jobs > 1 and sys.executable else None
 
     def __enter__(self):
         return self
 
     def __exit__(self, *failure):
-        if self._pool is not None:
-            self._pool.shutdown(kill_workers=True)
+        self._ended = True
+        if self._process is not None:
+            self._process.kill()
+        if self._talking is not None:
+            self._talking.shutdown(cancel_futures=True)
+        if self._process is not None:
+            self._process.wait()
+            for pipe in (self._process.stdin, self._process.stdout):
+                with suppress(OSError):  # what was never sent cannot be flushed
+                    pipe.close()
 
     def begin(self, work, *arguments):
         """Begin work(*arguments), a function that another process can import by name; returns a _Begun."""
-        future = None
-        if self._pool is not None:
-            with suppress(BrokenExecutor):
-                future = self._pool.submit(_worked, work, arguments)
-        return _Begun(self, work, arguments, future)
+        return _Begun(self, work, arguments, self._talking and self._talking.submit(self._answer, work, arguments))
+
+    def _answer(self, work, arguments):
+        """What _serve answers, once it does."""
+        if self._process is None:
+            environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+            command, pipe = [sys.executable, "-m", "facewright.beside"], subprocess.PIPE
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment)
+        if self._ended:  # meanwhile
+            self._process.kill()
+        pickle.dump((work, arguments), self._process.stdin, pickle.HIGHEST_PROTOCOL)
+        self._process.stdin.flush()
+        return pickle.load(self._process.stdout)
 
 
 class _Begun:
     """Work that goes on elsewhere, or is still to be done."""
 
-    def __init__(self, beside, work, arguments, future):
-        self._beside, self._work, self._arguments, self._future = beside, work, arguments, future
+    def __init__(self, beside, work, arguments, answer):
+        self._beside, self._work, self._arguments, self._answer = beside, work, arguments, answer
 
     def result(self):
         """What the work gives, once it is done."""
-        if self._future is not None:
-            # A process that the system has ended, for want of memory say, is done without.
-            with suppress(BrokenExecutor):
-                result, peak_mb = self._future.result()
-                self._beside.peak_mb = max(self._beside.peak_mb, peak_mb)
-                return result
-        return self._work(*self._arguments)
+        answer = None
+        if self._answer is not None:
+            with suppress(*_GONE):  # a process that the system has ended, for want of memory say, is done without
+                answer = self._answer.result()
+        if answer is None:
+            return self._work(*self._arguments)
+        result, failure, peak_mb = answer
+        self._beside.peak_mb = max(self._beside.peak_mb, peak_mb)
+        if failure is not None:
+            raise failure
+        return result
 
 
-def _worked(work, arguments):
-    with threadpool_limits(1, user_api="blas"):  # as in the first process
-        return work(*arguments), peak_memory_mb()
+def _serve(source, sink):
+    """Do what comes from the file source, and write into sink (result, exception or None, peak_memory_mb())."""
+    with threadpool_limits(1, user_api="blas"), suppress(*_GONE):
+        while True:
+            work, arguments = pickle.load(source)
+            result = failure = None
+            try:
+                result = work(*arguments)
+            except Exception as error:
+                failure = error
+            pickle.dump((result, failure, peak_memory_mb()), sink, pickle.HIGHEST_PROTOCOL)
+            sink.flush()
+
+
+def _main():
+    # Whoever interrupts the job means the first process, which sees to it that this one ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # What a library prints must not come between the answers.
+    sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    _serve(sys.stdin.buffer, sink)
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,22 +1,15 @@
 import os
 import signal
+import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
 
 from facewright.beside import Beside
-from facewright.errors import StageError
-
-
-def failing():
-    raise StageError("bake", "empty", "nothing is seen", {"share": 0.5})
-
-
-def killed_where_there_is_a_second_process(here):
-    if os.getpid() != here:
-        os.kill(os.getpid(), signal.SIGKILL if sys.platform != "win32" else signal.SIGTERM)
-    return "done here"
+from facewright.errors import InputError
+from facewright.template.store import find_template
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -30,13 +23,40 @@ def test_work_is_done_wherever_it_is_done(jobs):
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_what_goes_wrong_is_told_as_it_was(jobs):
-    with Beside(jobs) as beside, pytest.raises(StageError, match="nothing is seen") as failure:
-        beside.begin(failing).result()
-    assert failure.value.outcome == "empty" and failure.value.stats == {"share": 0.5}
+def test_what_goes_wrong_is_told_as_it_was(jobs, tmp_path):
+    with Beside(jobs) as beside:
+        with pytest.raises(InputError, match="nobody"):
+            beside.begin(find_template, tmp_path / "nobody").result()
+        with pytest.raises(FileNotFoundError):
+            beside.begin(os.stat, tmp_path / "nothing").result()
+        assert beside.begin(np.sum, np.ones(3)).result() == 3.0
+
+
+def test_what_a_library_prints_is_no_answer():
+    with Beside(2) as beside:
+        assert beside.begin(print, "hello").result() is None
+        assert beside.begin(os.system, "echo hello").result() == 0
 
 
 def test_what_a_killed_process_leaves_is_done_here():
     with Beside(2) as beside:
-        assert beside.begin(killed_where_there_is_a_second_process, os.getpid()).result() == "done here"
+        os.kill(beside.begin(os.getpid).result(), signal.SIGTERM)
+        assert beside.begin(os.getpid).result() == os.getpid()
         assert beside.begin(np.sum, np.ones(3)).result() == 3.0
+
+
+def test_it_ends_with_what_uses_it_whatever_it_does():
+    with Beside(2) as beside:
+        beside.begin(os.getpid).result()
+        beside.begin(time.sleep, 600.0)
+    assert beside._process.returncode is not None
+
+
+def test_it_ends_when_the_first_process_is_killed():
+    code = (
+        "import os, sys; from facewright.beside import Beside; beside = Beside(2); beside.begin(os.getpid).result()\n"
+        "sys.stdout.close(); os.kill(os.getpid(), 9)"
+    )
+    # Both write into the pipe of the first one's stderr, which is read to its end: until neither runs.
+    first = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, timeout=60)
+    assert first.returncode != 0 and not first.stderr
