@@ -1,8 +1,8 @@
 """Work that goes on in a second process, beside what this one does.
 
 Not in a thread: those of one Python share a lock that most of the work here holds, so that two took as long as one. And
-not in a pool of processes: one that was tried stayed for ever where the first process is killed. This one reads its work
-from a pipe, and ends with it.
+not in a pool of processes: one that was tried stayed for ever where the first process was killed. This one reads its
+work from a pipe, and ends with it.
 """
 
 from __future__ import annotations
