@@ -189,17 +189,14 @@ def rig_job(path, out, options=None, progress=None):
     folder = find_template(options.template)
     template = read_template(folder)
     output = OutputFolder(out)
-    store = StageStore(output.make())
-    store.sweep()
-    run = _Run(store, progress, rerun_from)
-    try:
+    with output.held() as stages:
+        store = StageStore(stages)
+        store.sweep()
+        run = _Run(store, progress, rerun_from)
         # Threads share the work by shapes and pictures. Those of BLAS would only wait for each other: its matrices are
         # small, and the job took twice the core seconds with them.
         with threadpool_limits(1, user_api="blas"):
             return _run_job(run, Path(path), output, options, inputs, placed, template, folder)
-    except InputError:
-        output.remove_what_is_new()
-        raise
 
 
 def _run_job(run, path, output, options, inputs, placed, template, folder):

@@ -219,7 +219,7 @@ def test_a_killed_run_goes_on_wherever_it_was_killed(sample_job, tmp_path, monke
     report = rig_job(sample_path(), out, sample_job.options)
     assert [stage for stage in STAGES if not report["reused"][stage]] == ["07-write"]
     same_results(out, sample_job.folder)
-    assert sorted(path.name for path in (out / "stages").iterdir()) == sorted(STAGES)
+    assert sorted(path.name for path in (out / "stages").iterdir()) == sorted([*STAGES, "lock"])
 
 
 def kill_a_process_in_the_middle_of_registration(out):
@@ -292,6 +292,21 @@ def test_a_landmark_moved_by_hand_moves_the_fit(sample_job, copied, forbid, tmp_
 def fit_of(folder):
     with np.load(folder / "stages" / "03-register" / "arrays.npz") as arrays:
         return arrays["fit"]
+
+
+def test_a_second_run_at_once_is_refused_and_leaves_the_first_alone(tmp_path):
+    scan = tmp_path / "flat.obj"
+    scan.write_text("v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")
+
+    def progress(*_):
+        before = sorted((tmp_path / "result").rglob("*"))
+        with pytest.raises(InputError, match=f"another run .process {os.getpid()}."):
+            rig_job(scan, tmp_path / "result", JobOptions())
+        assert sorted((tmp_path / "result").rglob("*")) == before
+        raise Killed
+
+    with pytest.raises(Killed):
+        rig_job(scan, tmp_path / "result", JobOptions(), progress)
 
 
 def test_input_without_a_face_leaves_an_earlier_result_as_it_was(sample_job, copied, tmp_path):
