@@ -317,7 +317,7 @@ def _write(run, path, scan, face, shapes, figures, maps, found, output, options)
         with output.workshop() as folder, ThreadPoolExecutor(1) as beside:
             told = _Beside(beside, lambda jobs: build_report(scan, face, _carried(rig, options), *found), options.jobs)
             told.begin()
-            write_results(rig, maps, scan, face, folder, options, path.name)
+            write_results(rig, maps, scan, face, folder, options, f"{path.resolve().parent.name}/{path.name}")
             report = plain(told.result() | figures)
             return {}, {"report": report, "files": output.publish(folder, earlier)}
 

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from facewright import data
+from facewright.write import preview
 from facewright.write.preview import preview_sheet, write_preview
 
 
@@ -54,6 +57,19 @@ def test_the_sheet_is_wide_and_shows_something(sheet):
 def test_threads_change_no_pixel(sheet, ball_face, ball_scan):
     again = preview_sheet(ball_rig(ball_face), ball_scan(None), ball_face, jobs=2)
     np.testing.assert_array_equal(again, sheet)
+
+
+def test_the_words_on_the_sheet(ball_face, ball_scan, monkeypatch):
+    words = []
+    monkeypatch.setattr(preview, "compose_sheet", lambda *given: words.append(given))
+    rig = ball_rig(ball_face)
+    preview_sheet(rig, ball_scan(None), ball_face, title="anna/head.obj")
+    preview_sheet(replace(rig, in_betweens={"jawOpen": {0.5: "tongueOut"}}), ball_scan(None), ball_face)
+    (title, plain, sections), (_, full, _) = words
+    assert title == "anna/head.obj" and plain.endswith(", 3 shapes")
+    assert full.endswith(", 2 shapes (and 1 halves, in-betweens and correctives)")
+    shapes = next(section for section in sections if section.heading.startswith("Shapes"))
+    assert [cell.caption for cell in shapes.rows[0]] == ["neutral", "jawOpen", "mouthClose (jaw open)", "tongueOut"]
 
 
 def test_textured_scans_of_two_images_and_coloured_ones(ball_face, ball_scan, tmp_path):
