@@ -8,15 +8,21 @@ from __future__ import annotations
 from itertools import pairwise
 
 
-def expand_weights(pose_weights, in_betweens, correctives, halves=None):
+def expand_weights(pose_weights, in_betweens, correctives, halves=None, names=None):
     """dict target -> weight of every target that plays a part, from dict shape -> weight.
 
     in_betweens  shape -> {weight: target}: targets the shape passes on its way to 1; each acts by a hat function that
-                 is 1 at its own weight and 0 at its neighbours'. Outside 0..1 the nearest piece goes on.
+                 is 1 at its own weight and 0 at its neighbours'. Outside 0..1 the nearest piece goes on: weights are
+                 not clipped, as players of glTF do not.
     correctives  target -> drivers: acts with the product of the drivers' weights, each clipped to 0..1
     halves       sum -> (left, right), for a rig that has these in its place: a weight of the sum is given to both, and
                  as a driver it weighs as much as its halves on average
+    names        all targets of the rig: a pose that names a shape beyond these and halves is a ValueError. Without
+                 them no name is checked, and one that is in no table is its own target.
     """
+    for name in pose_weights if names is not None else ():
+        if name not in names and name not in (halves or {}):
+            raise ValueError(f"the rig has no shape {name!r}")
     result = {}
     pose, drive = _halved(pose_weights, halves or {})
     for name, weight in pose.items():

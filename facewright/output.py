@@ -1,4 +1,6 @@
-"""The output folder of a job: made, checked, filled at once, and taken back when the input turns out to be unusable."""
+"""The output folder of a job: made, checked, filled at once by one run at a time, and taken back when the input turns
+out to be unusable.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +12,9 @@ from pathlib import Path
 
 from facewright.cache import file_digest
 from facewright.errors import InputError
+from facewright.lock import Locked, locked
+
+RESULTS = ("rig.glb", "obj", "rig", "textures", "preview.png", "report.json", "CREDITS.txt")
 
 
 class OutputFolder:
@@ -34,6 +39,37 @@ class OutputFolder:
                 f"output folder {self.folder}: cannot be written ({error.strerror}); choose another --out"
             ) from error
         return self.stages
+
+    @contextmanager
+    def held(self):
+        """The folder of the stages, made, for this run alone; what this run made goes again if its input is unusable.
+
+        raises InputError where another run has the folder, or somebody else's files bear the names of results
+        """
+        self._refuse_foreign()
+        stages = self.make()
+        try:
+            stages.mkdir(exist_ok=True)
+            try:
+                with locked(stages / "lock"):
+                    yield stages
+            except InputError:
+                self.remove_what_is_new()
+                raise
+        except Locked as other:
+            raise InputError(
+                f"output folder {self.folder}: another run (process {other.owner}) writes into it; wait for it, or "
+                "choose another --out"
+            ) from None
+
+    def _refuse_foreign(self):
+        taken = [name for name in RESULTS if (self.folder / name).exists()]
+        ours = (self.folder / "rig" / "rig.json").is_file() or any(self.stages.glob("*/stage.json"))
+        if taken and not ours:
+            raise InputError(
+                f"output folder {self.folder}: its {taken[0]} is from no earlier run and would be overwritten; "
+                "choose another --out"
+            )
 
     @contextmanager
     def taken_back_on_failure(self):

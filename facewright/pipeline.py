@@ -52,6 +52,7 @@ STAGE_SHARE = {
     "06-bake": 0.01,
     "07-write": 0.35,
 }
+BAKE_ALONE_SHARE = 0.16  # more, of a bake that has nothing beside it: shapes came from the cache
 
 
 @dataclass(frozen=True)
@@ -109,33 +110,40 @@ class _Run:
     def __init__(self, store, progress, rerun_from):
         self.store, self.progress, self.rerun_from = store, progress, rerun_from
         self.key = fingerprint("facewright", __version__)
-        self.seconds, self.reused, self.done = {}, {}, 0.0
-        self.started = time.perf_counter()
+        self.seconds, self.reused = {}, {}
 
     def stage(self, name, work, *depends, intact=lambda info: True):
         """Arrays and info of a stage: from disk if nothing it depends on changed and it is intact, else from work()."""
         self.key = fingerprint(self.key, name, *depends)
-        self.tell(name, "")
         cached = None
         if STAGES.index(name) < self.rerun_from:
             cached = self.store.load(name, self.key)
             cached = cached if cached is not None and intact(cached.info) else None
         else:
             self.rerun_from = STAGES.index(name)
+        self.tell(name, "", None if cached is not None else self._left(name))
         if cached is None:
             start = time.perf_counter()
             arrays, info = work()
             cached = self.store.save(name, self.key, arrays, info, round(time.perf_counter() - start, 3))
         self.seconds[name], self.reused[name] = cached.seconds, cached.reused
-        self.done += STAGE_SHARE[name]
         return cached.arrays, cached.info
 
-    def tell(self, name, message):
-        """Progress: stage, its number, share done, seconds left or None."""
-        spent = time.perf_counter() - self.started
-        left = None if self.done < 0.1 else spent / self.done * (1 - self.done)
+    def tell(self, name, message, left=None):
+        """Progress: stage, its number, seconds left or None: a stage from the cache may be followed by more of them."""
         if self.progress is not None:
             self.progress(name, STAGES.index(name) + 1, len(STAGES), left, message)
+
+    def _left(self, name):
+        """Seconds to the end as a stage begins its work, by those of the stages before it, in this run or as they were
+        cached; None where these say too little. A bake is not asked: it depends on what went on beside it.
+        """
+        asked = [stage for stage in self.seconds if stage != "06-bake"]
+        done = sum(STAGE_SHARE[stage] for stage in asked)
+        ahead = sum(STAGE_SHARE[stage] for stage in STAGES[STAGES.index(name) :])
+        if name == "06-bake" and self.reused["05-transfer"]:
+            ahead += BAKE_ALONE_SHARE
+        return None if done < 0.1 else sum(self.seconds[stage] for stage in asked) / done * ahead
 
 
 def _stage_number(word):
@@ -164,17 +172,14 @@ def rig_job(path, out, options=None, progress=None):
     folder = find_template(options.template)
     template = read_template(folder)
     output = OutputFolder(out)
-    store = StageStore(output.make())
-    store.sweep()
-    run = _Run(store, progress, rerun_from)
-    try:
+    with output.held() as stages:
+        store = StageStore(stages)
+        store.sweep()
+        run = _Run(store, progress, rerun_from)
         # Threads of BLAS would only wait for each other: its matrices are small, and the job took twice the core
         # seconds with them.
         with threadpool_limits(1, user_api="blas"), Beside(options.jobs) as beside:
             return _run_job(run, Path(path), output, options, inputs, placed, template, folder, beside)
-    except InputError:
-        output.remove_what_is_new()
-        raise
 
 
 def _run_job(run, path, output, options, inputs, placed, template, folder, beside):

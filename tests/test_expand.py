@@ -39,6 +39,18 @@ def test_products_and_clipping():
     assert found["blink+squint"] == 0.5 and "all" not in found and found["squint"] == 2.0
 
 
+def test_weights_beyond_one_go_on_along_the_last_piece():
+    assert expand_weights({"blink": 1.5}, STEPS, {}) == {"blink@0.5": -1.0, "blink": 2.0}
+    assert expand_weights({"blink": -0.5}, STEPS, {}) == {"blink@0.5": -1.0}
+
+
+def test_names_are_checked_where_they_are_known():
+    assert expand_weights({"wink": 1.0}, STEPS, PAIRS) == {"wink": 1.0}
+    assert expand_weights({"jaw": 0.5}, {}, {}, HALVES, ("jawLeft", "jawRight")) == {"jawLeft": 0.5, "jawRight": 0.5}
+    with pytest.raises(ValueError, match="no shape 'wink'"):
+        expand_weights({"jaw": 0.5, "wink": 1.0}, {}, {}, HALVES, ("jawLeft", "jawRight"))
+
+
 HALVES = {"jaw": ("jawLeft", "jawRight")}
 
 
@@ -47,10 +59,22 @@ def test_a_sum_is_given_to_its_halves_and_drives_as_their_mean():
     assert found == {"jawLeft": 0.75, "jawRight": 0.5, "blink": 1.0, "blink+jaw": 0.625}
 
 
+def node(code):
+    return subprocess.run(["node", "--input-type=module", "-e", code], capture_output=True, text=True)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_javascript_twin_checks_names_too():
+    code = f"import {{ expandWeights }} from {json.dumps(TWIN.as_uri())};"
+    code += f"const check = (pose) => expandWeights(pose, {{}}, {{}}, {json.dumps(HALVES)}, ['jawLeft', 'jawRight']);"
+    assert node(code + "console.log(check({ jaw: 1 }));").returncode == 0
+    assert "the rig has no shape 'wink'" in node(code + "check({ jaw: 1, wink: 0 });").stderr
+
+
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
 def test_the_javascript_twin_says_the_same():
     rng = np.random.default_rng(0)
-    poses = [dict(zip(("blink", "squint", "jaw", "smile"), rng.uniform(-0.2, 1.2, 4))) for _ in range(50)]
+    poses = [dict(zip(("blink", "squint", "jaw", "smile"), rng.uniform(-0.5, 1.5, 4))) for _ in range(50)]
     poses += [{"blink": 0.5}, {"jaw": 0.25, "blink": 1.0}, {}, {"jawLeft": 0.5, "squint": 1.0, "blink": 0.7}]
     code = (
         f"import {{ expandWeights }} from {json.dumps(TWIN.as_uri())};"
@@ -58,8 +82,7 @@ def test_the_javascript_twin_says_the_same():
         "const both = (pose) => [expandWeights(pose, steps, pairs), expandWeights(pose, steps, pairs, halves)];"
         "console.log(JSON.stringify(poses.map(both)));"
     )
-    run = subprocess.run(["node", "--input-type=module", "-e", code], capture_output=True, text=True, check=True)
-    for pose, answers in zip(poses, json.loads(run.stdout)):
+    for pose, answers in zip(poses, json.loads(node(code).stdout)):
         for theirs, halves in zip(answers, (None, HALVES)):
             ours = expand_weights(pose, STEPS, PAIRS, halves)
             assert ours.keys() == theirs.keys()

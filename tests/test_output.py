@@ -74,3 +74,19 @@ def test_a_folder_where_a_file_should_be(tmp_path):
     (tmp_path / "result" / "rig.glb").mkdir()
     with pytest.raises(InputError, match=r"cannot write .*rig\.glb"):
         publish(output, {"rig.glb": "one"})
+
+
+def test_files_of_others_where_results_would_go_are_left_alone(tmp_path):
+    out = tmp_path / "result"
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    with OutputFolder(out).held():
+        pass
+    (out / "preview.png").write_text("mine")
+    with pytest.raises(InputError, match=r"its preview\.png is from no earlier run"), OutputFolder(out).held():
+        pass
+    assert (out / "preview.png").read_text() == "mine"
+    (out / "rig").mkdir()
+    (out / "rig" / "rig.json").write_text("{}")  # a result without its stages is one
+    with OutputFolder(out).held():
+        pass

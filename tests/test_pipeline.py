@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from facewright import pipeline
+from facewright.cache import StageStore
 from facewright.errors import InputError
 from facewright.evaluate.gltf import read_glb
 from facewright.mesh.closest import Surface
 from facewright.packing import unpack_face
-from facewright.pipeline import STAGES, JobOptions, rig_job
+from facewright.pipeline import BAKE_ALONE_SHARE, STAGE_SHARE, STAGES, JobOptions, rig_job
 from facewright.read import read_scan
 from facewright.sample import sample_path
 from facewright.write.rig import read_rig
@@ -218,7 +219,7 @@ def test_a_killed_run_goes_on_wherever_it_was_killed(sample_job, tmp_path, monke
     report = rig_job(sample_path(), out, sample_job.options)
     assert [stage for stage in STAGES if not report["reused"][stage]] == ["07-write"]
     same_results(out, sample_job.folder)
-    assert sorted(path.name for path in (out / "stages").iterdir()) == sorted(STAGES)
+    assert sorted(path.name for path in (out / "stages").iterdir()) == sorted([*STAGES, "lock"])
 
 
 def kill_a_process_in_the_middle_of_registration(out):
@@ -293,6 +294,21 @@ def fit_of(folder):
         return arrays["fit"]
 
 
+def test_a_second_run_at_once_is_refused_and_leaves_the_first_alone(tmp_path):
+    scan = tmp_path / "flat.obj"
+    scan.write_text("v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")
+
+    def progress(*_):
+        before = sorted((tmp_path / "result").rglob("*"))
+        with pytest.raises(InputError, match=f"another run .process {os.getpid()}."):
+            rig_job(scan, tmp_path / "result", JobOptions())
+        assert sorted((tmp_path / "result").rglob("*")) == before
+        raise Killed
+
+    with pytest.raises(Killed):
+        rig_job(scan, tmp_path / "result", JobOptions(), progress)
+
+
 def test_input_without_a_face_leaves_an_earlier_result_as_it_was(sample_job, copied, tmp_path):
     scan = tmp_path / "flat.obj"
     scan.write_text("v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")
@@ -300,6 +316,30 @@ def test_input_without_a_face_leaves_an_earlier_result_as_it_was(sample_job, cop
         rig_job(scan, copied, sample_job.options)
     same_results(copied, sample_job.folder)
     assert (copied / "report.json").is_file()
+
+
+@pytest.mark.parametrize("changed", [None, "03-register", "05-transfer", "06-bake", "07-write"])
+def test_the_time_left_is_that_of_the_stages_that_are_not_in_the_cache(tmp_path, changed):
+    def run_stages(depends):
+        told = {}
+        run = pipeline._Run(StageStore(tmp_path), lambda name, *rest: told.update({name: rest[2]}), len(STAGES))
+        for name in STAGES:
+            run.stage(name, lambda: ({}, {}), depends if name == changed else None)
+        return told
+
+    run_stages("before")
+    for name in STAGES:  # a job of 100 seconds
+        file = tmp_path / name / "stage.json"
+        file.write_text(json.dumps(json.loads(file.read_text()) | {"seconds": 100 * STAGE_SHARE[name]}))
+    told = run_stages("after")
+    assert list(told) == list(STAGES)
+    first = len(STAGES) if changed is None else STAGES.index(changed)
+    assert all(told[name] is None for name in STAGES[:first])
+    if changed == "03-register":  # all before took 9 % of the time, which says too little
+        assert told[changed] is None
+    elif changed is not None:
+        alone = 100 * BAKE_ALONE_SHARE if changed == "06-bake" else 0.0
+        assert told[changed] == pytest.approx(sum(100 * STAGE_SHARE[name] for name in STAGES[first:]) + alone)
 
 
 def test_names_of_stages():

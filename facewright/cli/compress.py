@@ -23,7 +23,7 @@ def add_arguments(parser):
     parser.add_argument("--mesh", required=True, metavar="OBJ", help="the mesh with UVs that the textures belong to")
     parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the packed set")
     parser.add_argument("--method", choices=("refined", "paper"), default="refined", help="default: refined")
-    parser.add_argument("--masks", type=int, default=53, help="masks of --method paper (default: 53)")
+    parser.add_argument("--masks", type=int, metavar="N", help="masks of --method paper (default: 53)")
     parser.add_argument(
         "--textures",
         type=int,
@@ -63,8 +63,11 @@ def run(options):
     from facewright.compress.packed import with_examples
     from facewright.output import OutputFolder
 
-    if options.masks < 1:
+    if options.masks is not None and options.masks < 1:
         raise InputError(f"compress: --masks {options.masks}; at least 1 is needed")
+    for name in ("masks", "region"):
+        if getattr(options, name) is not None and options.method != "paper":
+            raise InputError(f"compress: --{name} works with --method paper only; refined finds its weights everywhere")
     budget = None if options.budget is None else parse_size(options.budget)
     sources = list_maps(options)
     read = [path for neutral, paths in sources.values() for path in (neutral, *paths.values())]
@@ -77,7 +80,8 @@ def run(options):
     if options.examples is not None:
         *examples, strangers = read_examples(options.examples, names)
     shapes = None if examples is None else len(examples[0])
-    chosen = FacezipOptions(options.method, options.textures, options.masks, budget=budget, shapes=shapes)
+    masks = {} if options.masks is None else {"masks": options.masks}
+    chosen = FacezipOptions(options.method, options.textures, **masks, budget=budget, shapes=shapes)
     reader = _Reader(sources, mesh, options.align)
     with Progress(options.quiet) as progress, OutputFolder(options.out).taken_back_on_failure():
         packed = facezip_maps(
@@ -164,7 +168,7 @@ def rows_left_out(table, strangers):
     if not strangers:
         return ""
     named = ", ".join(strangers[:6]) + (", ..." if len(strangers) > 6 else "")
-    return f"{table}: {counted(len(strangers), 'row')} left out, for there is no such texture: {named}"
+    return f"{table}: {counted(len(strangers), 'row')} left out, of textures that are not in the set: {named}"
 
 
 def counted(count, what):

@@ -36,6 +36,7 @@ def run(options):
     stream = io.BytesIO()
     Image.fromarray(image[:, :, 0] if image.shape[2] == 1 else image).save(stream, "PNG")
     replace_file(options.out, stream.getvalue())
+    print(f"{options.out}: {image.shape[1]} x {image.shape[0]} pixels")
 
 
 def parse_weights(text):

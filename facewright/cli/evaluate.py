@@ -13,12 +13,14 @@ Distances are in millimetres; docs/evaluate.md defines every figure.
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
 from facewright.errors import InputError
 
 HELP = "print the figures of a finished job"
+APART_MM = 5.0  # a fit lies within 0.5 mm of its scan: a scan beyond this everywhere is another one, or was moved
 COLUMNS = ("mean", "rms", "p95", "max", "left_out")
 COLUMN_WIDTHS = (("full", 9), ("plain 52", 9), ("bar", 10), ("bar of 52", 10))
 
@@ -53,11 +55,15 @@ def run(options):
         evaluate(folder, options)
         return
     if what == ["rig"]:
+        if options.scan is not None:
+            raise InputError("evaluate rig: looks at no scan; leave out --scan, or the word rig")
         print_bars(_existing(folder), options.blends, options.json)
         return
     if what:
         raise InputError(f"evaluate: one folder at a time, got {len(options.result)}; or: evaluate rig FOLDER")
     figures = collect(_existing(folder), options.scan, options.shapes)
+    if "rig_to_scan" in figures:
+        note_a_scan_apart(figures["rig_to_scan"], options.scan)
     if options.json:
         print(json.dumps(figures, indent=1))
         return
@@ -72,6 +78,14 @@ def run(options):
         print_distances("the rig's neutral against the scan (mm)", rows)
     for name, values in figures.get("shapes", {}).items():
         print("  ".join([name.ljust(22), *(f"{key} {value:.4g}" for key, value in values.items())]))
+
+
+def note_a_scan_apart(regions, scan):
+    """Say so where no region of a rig lies near the scan; regions as measure_rig_distances gives them."""
+    means = [ways["rig_to_scan"]["mean"] for ways in regions.values()]
+    nearest = min((mean for mean in means if mean is not None), default=float("inf"))
+    if nearest > APART_MM:
+        print(f"note: the rig is nowhere near {scan}: made from another scan, or moved since?", file=sys.stderr)
 
 
 def _existing(path):

@@ -40,6 +40,8 @@ def run(options):
     picture = out.with_suffix(".png")
     if out == picture or out.is_dir():
         raise InputError(f"{out}: points are written as JSON with a picture beside it; give --out a name like p.json")
+    if picture.exists() and not out.exists():  # head.json beside the scan's own head.png
+        raise InputError(f"{picture}: is there already and would be overwritten; give --out another name")
     scan, _ = clean_scan(read_scan(options.scan, albedo=options.albedo, unit=options.units))
     found = find_landmarks(scan, LandmarkOptions(options.up, options.units, options.mirror))
     names = None if options.all else {f"mp{number}": name for name, number in NAMED.items()}

@@ -76,7 +76,7 @@ def _build(options):
     from facewright.template.fetch import build_folder, description_of
 
     template = build_folder(options.source, description_of(options.description), options.out)
-    print(f"{template!r} is in {options.out}")
+    _tell(template, options.out, options.out)
     return 0
 
 
@@ -86,8 +86,13 @@ def _fetch(options):
     folder, template = fetch_template(
         options.template, source_folder=options.source, out=options.out, progress=None if options.source else _progress
     )
-    print(f"{template!r} is in {folder}")
+    _tell(template, folder, options.out or options.template)
     return 0
+
+
+def _tell(template, folder, word):
+    counts = f"{len(template.vertices):,} vertices, {len(template.shape_names)} shapes"
+    print(f"{template.info['name']} ({counts}) is in {folder}; 'facewright rig' fits it with --template {word}")
 
 
 def _progress(done, total):

@@ -119,8 +119,13 @@ def read_examples(path, names):
         raise InputError(f"{path}: the first line must name the shapes, each once, after a first cell for the textures")
     weights = dict(table)
     for name in names:
-        if sum(row == name for row, _ in table) != 1 or len(weights[name]) != len(shapes):
-            raise InputError(f"{path}: needs one row of {len(shapes)} weights for every texture; look at {name}")
+        rows = sum(row == name for row, _ in table)
+        if rows != 1:
+            raise InputError(f"{path}: has {rows or 'no'} rows for {name}; every texture of the set needs one")
+        if len(weights[name]) != len(shapes):
+            raise InputError(
+                f"{path}: shapes in the first line: {len(shapes)}, weights for {name}: {len(weights[name])}"
+            )
     B = np.array([weights[name] for name in names])
     if not np.isfinite(B).all():
         raise InputError(f"{path}: holds a weight that is no finite number")

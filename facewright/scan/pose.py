@@ -41,8 +41,10 @@ from facewright.scan.sightings import (
 AGREED, AGREED_WHOLLY = 0.4, 0.75
 QUICK_VIEWS = ((-20.0, 0.0), (0.0, -15.0), (0.0, 0.0), (0.0, 15.0), (20.0, 0.0))
 FLIP_VIEWS = ((-15.0, 0.0), (0.0, 0.0), (15.0, 0.0))
-# A human head's distance between the pupils lies within these, mm.
+# A human head's distance between the pupils lies within these, mm; outside the second pair a unit is mistaken: inches
+# for centimetres put the eyes of a small head 114 mm apart, centimetres for inches those of a large one 30.
 PLAUSIBLE_IPD_MM = (45.0, 75.0)
+POSSIBLE_IPD_MM = (30.0, 110.0)
 # Pieces further than this from every landmark are no part of the head, mm.
 HEAD_REACH_MM = 150.0
 # Edges of a mesh this long within this distance from between the eyes are facets that one sees, mm.
@@ -114,7 +116,7 @@ def find_landmarks(scan, options=LandmarkOptions()):
     guess = fit_canonical(landmarks.positions(scan.vertices, scan.faces), landmarks.weights)
     T = guess.T
     ipd = _pupil_distance(scan, landmarks)
-    unit_mm, source, more = choose_unit(ipd, scan.unit_mm, MM_PER_UNIT.get(options.units))
+    unit_mm, source, more = choose_unit(ipd, scan.unit_mm, options.units)
     T = _rescaled(T, unit_mm)
     aligned = scan.transformed(T)
     stats = {
@@ -261,28 +263,36 @@ def _pupil_distance(scan, landmarks):
     The middle of an eye is that of the 16 points about it: of heads turned at random it differs by 0.05 % from run to
     run, the middle of the canthi by 0.3 %, the iris by 0.4 % (worse where the eyes are closed).
     """
-    points = landmarks.positions(scan.vertices, scan.faces)
-    return float(np.linalg.norm(points[list(EYE_LEFT)].mean(axis=0) - points[list(EYE_RIGHT)].mean(axis=0)))
+    points, known = landmarks.positions(scan.vertices, scan.faces), landmarks.weights > 0.0
+    left, right = (points[[i for i in eye if known[i]] or list(eye)].mean(axis=0) for eye in (EYE_LEFT, EYE_RIGHT))
+    return float(np.linalg.norm(left - right))
 
 
-def choose_unit(ipd, format_mm=None, given_mm=None):
+def choose_unit(ipd, format_mm=None, given=None):
     """Millimetres per unit of a file in which the eyes are ipd units apart: (unit_mm, source, warnings).
 
-    given_mm by the user, always believed; format_mm, believed if it makes a human head; else the unit among mm, cm,
-    dm, m and inch that does; else 63 mm between the eyes.
+    given, the user's word for it, is believed unless it is far from a human head; format_mm is believed if it makes
+    one; else the unit among mm, cm, dm, m and inch that does; else 63 mm between the eyes.
+    raises InputError for a given unit that cannot be
     """
     low, high = PLAUSIBLE_IPD_MM
-    if given_mm is not None:
-        return given_mm, "given", []
+    fitting = {name: value for name, value in MM_PER_UNIT.items() if low <= ipd * value <= high}
+    if given is not None:
+        apart = ipd * MM_PER_UNIT[given]
+        if POSSIBLE_IPD_MM[0] <= apart <= POSSIBLE_IPD_MM[1]:
+            return MM_PER_UNIT[given], "given", []
+        advice = "no unit makes them human, so leave it out"
+        for name, value in fitting.items():
+            advice = f"--units {name} would put them {ipd * value:.0f} mm apart"
+        raise InputError(f"--units {given} would put the eyes {round(apart, 2):,g} mm apart; {advice}")
     if format_mm is not None and low <= ipd * format_mm <= high:
         return format_mm, "format", []
     warnings = []
     if format_mm is not None:
         warnings.append(f"the format's unit would put the eyes {ipd * format_mm:.4g} mm apart; it was not believed")
-    fitting = [value for value in MM_PER_UNIT.values() if low <= ipd * value <= high]
     if fitting:
-        return min(fitting, key=lambda value: abs(ipd * value - INTERPUPILLARY_MM)), "found", warnings
-    warnings.append("no unit makes this a human head; it was scaled to 63 mm between the eyes (give --units)")
+        return min(fitting.values(), key=lambda value: abs(ipd * value - INTERPUPILLARY_MM)), "found", warnings
+    warnings.append("no unit makes this a human head; it was scaled to 63 mm between the eyes")
     return INTERPUPILLARY_MM / ipd, "assumed", warnings
 
 

@@ -1,6 +1,10 @@
 // The twin of facewright/expand.py: pose weights to the weights of all targets.
-// inBetweens: shape -> {weight: target}; correctives: target -> [drivers]; halves: sum -> [left, right].
-export function expandWeights(poseWeights, inBetweens, correctives, halves = {}) {
+// inBetweens: shape -> {weight: target}; correctives: target -> [drivers]; halves: sum -> [left, right];
+// names: all targets of the rig, for an Error where a pose names another shape.
+export function expandWeights(poseWeights, inBetweens, correctives, halves = {}, names = null) {
+  for (const name of names ? Object.keys(poseWeights) : []) {
+    if (!names.includes(name) && !Object.hasOwn(halves, name)) throw new Error(`the rig has no shape '${name}'`);
+  }
   const pose = { ...poseWeights };
   for (const [name, parts] of Object.entries(halves)) {
     const weight = pose[name] ?? 0;

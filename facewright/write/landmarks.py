@@ -12,7 +12,8 @@ from facewright.mesh.render import render, srgb_to_linear
 
 YAWS = (-45.0, 0.0, 45.0)
 CENTER, HALF_HEIGHT_MM, SIZE = (0.0, -35.0, 0.0), 85.0, (1000, 760)
-POINT, TEXT = (255, 214, 10), (255, 255, 255)
+POINT, TEXT, OUTLINE = (255, 214, 10), (255, 255, 255), (0, 0, 0)
+RING, SMALL_RING = 6, 4  # radii of named points and of all, pixels: what a point marks shows within
 
 
 def draw_landmarks(path, scan, landmarks, names=None):
@@ -42,9 +43,11 @@ def draw_landmarks(path, scan, landmarks, names=None):
             if normals[i] @ camera.R[2] <= 0:
                 continue
             x, y = pixels[i]
-            draw.ellipse([x - 3, y - 3, x + 3, y + 3], POINT, (0, 0, 0))
+            radius = RING if names else SMALL_RING
+            for r, width, color in ((radius + 1, 3, OUTLINE), (radius, 1, POINT)):
+                draw.ellipse([x - r, y - r, x + r, y + r], outline=color, width=width)
             if names:
-                draw.text((x + 6, y - 8), names[landmarks.names[i]], TEXT, font, stroke_width=2, stroke_fill=(0, 0, 0))
+                draw.text((x + 9, y - 8), names[landmarks.names[i]], TEXT, font, stroke_width=2, stroke_fill=OUTLINE)
         pictures.append(np.asarray(picture))
     # Encoded first: a full disk then leaves no half picture under a name that says it is one.
     data = io.BytesIO()

@@ -70,13 +70,19 @@ def preview_sheet(rig, scan, face, title=None, closer=None):
         *(closer() if closer else close_up_sections(rig, clay)),
     ]
     triangles = sum(len(mesh.faces) for mesh in rig.meshes)
-    subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {len(shapes)} shapes"
+    subtitle = f"template {rig.info.get('template', '?')}, {triangles:,} triangles, {_counted(rig, shapes)}"
     return compose_sheet(title or scan.name, subtitle, sections)
 
 
 def draw_close_ups(rig):
     """The close-ups of a preview, a third of its work, for who wants to draw them beside the rest."""
     return close_up_sections(rig, Puppet(rig))
+
+
+def _counted(rig, shapes):
+    """ "52 shapes", and how many more targets rig/ and --shapes full have for them."""
+    more = len(rig.target_names) - len(shapes)
+    return f"{len(shapes)} shapes" + (f" (and {more} halves, in-betweens and correctives)" if more else "")
 
 
 def _neutral_section(pictures, scan):
@@ -111,10 +117,10 @@ def _shape_section(cells):
 
 def _shape_cell(clay, name, names, camera):
     """The clay rig under one plain shape, None the neutral. mouthClose is made for an open jaw and shown with it."""
-    weights = {} if name is None else {name: 1.0}
+    weights, label = ({}, "neutral") if name is None else ({name: 1.0}, name)
     if name == "mouthClose" and "jawOpen" in names:
-        weights["jawOpen"] = 1.0
-    return Cell(clay.picture(weights, camera, full=False), " + ".join(weights) or "neutral")
+        weights["jawOpen"], label = 1.0, "mouthClose (jaw open)"
+    return Cell(clay.picture(weights, camera, full=False), label)
 
 
 def scan_drawables(scan, textured):

@@ -55,6 +55,7 @@ def test_compress_and_decompress(tmp_path, command, capsys):
     assert "preview.html is left out" in capsys.readouterr().out  # six textures are more than the shader reads
     frame = tmp_path / "frame.png"
     assert main(["decompress", f"{tmp_path}/packed", "--weights", "smile=1", "--out", str(frame)]) == 0
+    assert capsys.readouterr().out == f"{frame}: 56 x 48 pixels\n"
     smile = np.array(Image.open(tmp_path / "textures" / "smile.png")).astype(int)
     assert np.abs(np.array(Image.open(frame)).astype(int) - smile).max() <= 1
 
@@ -193,9 +194,9 @@ def test_example_shapes_count_in_the_budget_and_equal_textures_do_not(tmp_path, 
 @pytest.mark.parametrize(
     "rows,words",
     [
-        (["texture,a,b", *(f"{name},1,2" for name in NAMES[1:])], "smile"),
-        (["texture,a,b", *(f"{name},1,2" for name in NAMES), "jaw,3,4"], "jaw"),
-        (["texture,a,b", *(f"{name},1" for name in NAMES)], "one row of 2 weights"),
+        (["texture,a,b", *(f"{name},1,2" for name in NAMES[1:])], "no rows for smile"),
+        (["texture,a,b", *(f"{name},1,2" for name in NAMES), "jaw,3,4"], "2 rows for jaw"),
+        (["texture,a,b", *(f"{name},1" for name in NAMES)], "shapes in the first line: 2, weights for"),
         (["texture,a,b", *(f"{name},1,nan" for name in NAMES)], "no finite number"),
         (["texture,a,b", *(f"{name},1,x" for name in NAMES)], "cannot be read"),
         (["texture,a,a", *(f"{name},1,2" for name in NAMES)], "each once"),
@@ -214,7 +215,7 @@ def test_rows_of_other_textures_are_told(tmp_path, command, capsys):
     rows = ["texture,a,b", *(f"{name},{n},2" for n, name in enumerate(NAMES)), "wink,3,4", "neutral,0,0"]
     (tmp_path / "examples.csv").write_text("\n".join(rows))
     assert run(command, tmp_path, "--examples", f"{tmp_path}/examples.csv", "--ktx2", "none") == 0
-    assert "2 rows left out, for there is no such texture: wink, neutral" in capsys.readouterr().out
+    assert "2 rows left out, of textures that are not in the set: wink, neutral" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -325,6 +326,8 @@ def test_bad_input_ends_in_exit_code_2_and_leaves_nothing(tmp_path, command, cap
         (["--keep", "grin"], "no such texture"),
         (["--budget", "lots"], "is no size"),
         (["--masks", "0"], "at least 1"),
+        (["--masks", "9"], "--masks works with --method paper only"),
+        (["--region", "half.png"], "--region works with --method paper only"),
         (["--textures", "9"], "1 to 8"),
         (["--textures", "0"], "1 to 8"),
         (["--budget", "1e999"], "is no size"),

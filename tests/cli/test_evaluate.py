@@ -36,6 +36,23 @@ def test_json_is_json(small_rig, tmp_path, capsys, monkeypatch):
     assert json.loads(capsys.readouterr().out)["report"]["registration"]["folded"] == 2
 
 
+def test_a_scan_that_the_rig_was_not_made_from(small_rig, tmp_path, capsys, monkeypatch):
+    means = {"lips": 0.3, "face": 40.0}
+    monkeypatch.setattr("facewright.evaluate.rig.measure_neutral", lambda rig: {"vertices": 3})
+    monkeypatch.setattr("facewright.cli.evaluate.scan_in_rig_frame", lambda *_: None)
+    monkeypatch.setattr(
+        "facewright.evaluate.rig.measure_rig_distances",
+        lambda *_: {name: {"rig_to_scan": FIGURES | {"mean": mean}} for name, mean in means.items()},
+    )
+    command = ["evaluate", str(result_folder(tmp_path, small_rig)), "--scan", "other.obj"]
+    assert main(command) == 0 and capsys.readouterr().err == ""
+    for lips in (12.0, None):
+        means["lips"] = lips
+        assert main(command) == 0 and "nowhere near other.obj" in capsys.readouterr().err
+    assert main(["evaluate", "rig", str(tmp_path), "--scan", "other.obj"]) == 2
+    assert "leave out --scan" in capsys.readouterr().err
+
+
 def test_a_folder_that_is_no_result(tmp_path, capsys):
     assert main(["evaluate", str(tmp_path)]) == 2
     assert "rig" in capsys.readouterr().err

@@ -26,3 +26,10 @@ def test_no_face(tmp_path, capsys):
     assert main(["landmarks", str(cube), "--out", str(tmp_path / "a.json")]) == 2
     assert capsys.readouterr().err.startswith("facewright:")
     assert not (tmp_path / "a.json").exists()
+
+
+def test_a_picture_of_the_same_name_is_left_alone(tmp_path, capsys):
+    (tmp_path / "head.png").write_text("mine")
+    assert main(["landmarks", str(sample_path()), "--out", str(tmp_path / "head.json")]) == 2
+    assert "another name" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["head.png"]

@@ -143,6 +143,7 @@ def test_an_empty_output_folder_stays_empty(tmp_path, refused):
         (["--landmarks", "nowhere.json"], "nowhere.json"),
         (["--landmarks", __file__], "JSON"),
         (["--template", "nobody"], "'nobody' is neither a folder nor a known template"),
+        (["--units", "mm"], "--units cm would put them 59 mm"),
         (["--from", "regster"], "the stages are read, landmarks, register"),
     ],
 )

@@ -27,6 +27,18 @@ def test_info_shows_licence_and_parts(capsys):
     assert "CC0" in out and "topology_id" in out and "teeth_lower" in out and "lip_seam_upper" in out
 
 
+def test_a_template_that_was_made_is_said_in_one_sentence(capsys, tmp_path, monkeypatch, hm08):
+    monkeypatch.setattr("facewright.template.fetch.build_folder", lambda *_: hm08)
+    monkeypatch.setenv("FACEWRIGHT_HOME", str(tmp_path / "home"))
+    assert call("fetch", "ict", "--from", str(tmp_path)) == 0
+    line = capsys.readouterr().out
+    assert line.startswith("hm08 (") and line.endswith("--template ict\n") and str(tmp_path / "home") in line
+    for action in (["build"], ["fetch", "ict"]):
+        assert call(*action, "--from", str(tmp_path), "--out", str(tmp_path / "out")) == 0
+        line = capsys.readouterr().out
+        assert "Template(" not in line and line.endswith(f"--template {tmp_path / 'out'}\n")
+
+
 def test_unknown_template_and_folder(tmp_path):
     with pytest.raises(InputError, match="nobody"):
         call("info", "nobody")

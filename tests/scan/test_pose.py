@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import facewright
+from facewright.conventions import MM_PER_UNIT
 from facewright.data import Scan
 from facewright.errors import InputError
 from facewright.read import read_scan
@@ -134,6 +135,7 @@ def test_a_face_by_hand_where_none_is_found(ball_scan):
     found = find_landmarks(ball, LandmarkOptions(landmarks=marks, units="mm"))
     assert (found.landmarks.weights > 0).sum() == 6 and "hard to find" in found.warnings[0]
     assert np.diag(found.T_scan_to_ours).min() > 0.7  # upright, however unlike a face a ball is
+    assert found.stats["ipd_mm"] == pytest.approx(63.0, abs=1.0)  # only of what is known
 
 
 def test_up_narrows_the_search(sample):
@@ -157,7 +159,17 @@ def test_units():
     assert (unit, source) == (10.0, "found") and "not believed" in warnings[0]
     unit, source, warnings = choose_unit(1.2)
     assert unit == pytest.approx(52.5) and source == "assumed" and "63 mm" in warnings[0]
-    assert choose_unit(1.2, 1000.0, 1.0) == (1.0, "given", [])
+    assert choose_unit(0.09, 10.0, "m") == (1000.0, "given", [])  # a large head, and the user says so
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm", "dm", "m", "inch"])
+def test_a_given_unit_that_cannot_be_is_refused_and_the_one_that_fits_is_named(unit):
+    for ipd in (45.0, 63.0, 75.0):
+        for wrong in {"mm", "cm", "dm", "m", "inch"} - {unit}:
+            with pytest.raises(InputError, match=rf"--units {wrong} would .*; --units {unit} would put them {ipd:.0f}"):
+                choose_unit(ipd / MM_PER_UNIT[unit], given=wrong)
+    with pytest.raises(InputError, match="leave it out"):
+        choose_unit(1.2, given="mm")
 
 
 @pytest.mark.parametrize("name", ["lee-perry-smith/head.obj", "menpo-james/james.obj"])

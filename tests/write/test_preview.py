@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from facewright import data
+from facewright.write import preview
 from facewright.write.preview import draw_close_ups, preview_sheet, write_preview
 
 
@@ -55,6 +58,19 @@ def test_close_ups_drawn_beside_the_rest_are_the_same(sheet, ball_face, ball_sca
     rig = ball_rig(ball_face)
     again = preview_sheet(rig, ball_scan(None), ball_face, closer=lambda: draw_close_ups(rig))
     np.testing.assert_array_equal(again, sheet)
+
+
+def test_the_words_on_the_sheet(ball_face, ball_scan, monkeypatch):
+    words = []
+    monkeypatch.setattr(preview, "compose_sheet", lambda *given: words.append(given))
+    rig = ball_rig(ball_face)
+    preview_sheet(rig, ball_scan(None), ball_face, title="anna/head.obj")
+    preview_sheet(replace(rig, in_betweens={"jawOpen": {0.5: "tongueOut"}}), ball_scan(None), ball_face)
+    (title, plain, sections), (_, full, _) = words
+    assert title == "anna/head.obj" and plain.endswith(", 3 shapes")
+    assert full.endswith(", 2 shapes (and 1 halves, in-betweens and correctives)")
+    shapes = next(section for section in sections if section.heading.startswith("Shapes"))
+    assert [cell.caption for cell in shapes.rows[0]] == ["neutral", "jawOpen", "mouthClose (jaw open)", "tongueOut"]
 
 
 def test_textured_scans_of_two_images_and_coloured_ones(ball_face, ball_scan, tmp_path):
