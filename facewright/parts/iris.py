@@ -198,6 +198,8 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
     if not seen.any():
         raise ValueError("paint_eye: the part's UVs cover no texel")
     directions = interpolate(vertices, faces, face[seen], barycentric[seen]) - ball.center
+    if not inner:
+        directions = _raised(directions, ball)
     colors = eye_colors(directions, ball.axis, look)
     if inner:
         colors[np.degrees(angle_from(ball.axis, directions)) > look.iris_deg + _RIM_DEG] = _DARK
@@ -205,3 +207,15 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
     image[seen] = colors
     rows, columns = distance_transform_edt(~seen, return_distances=False, return_indices=True)
     return (linear_to_srgb(np.clip(image[rows, columns], 0, 1)) * 255 + 0.5).astype(np.uint8)
+
+
+def _raised(offsets, ball):
+    """Points (k, 3) from the eye's centre; those of a hollow in front (an iris set back) brought to the ball's surface
+    along its axis: so they are as large as on a ball, seen from in front."""
+    along = offsets @ ball.axis
+    short = (along > 0) & (np.linalg.norm(offsets, axis=1) < ball.radius)
+    across = offsets[short] - along[short, None] * ball.axis
+    height = np.sqrt(ball.radius**2 - (across**2).sum(axis=1))
+    raised = offsets.copy()
+    raised[short] = across + height[:, None] * ball.axis
+    return raised
