@@ -18,7 +18,7 @@ EYE_RINGS_DEG = (5, 10, 15, 19, 22.5, 25.5, 28, 30.5, 33.5, 37.5, 43, 50, 58, 67
 CORNEA_RINGS_DEG = (6, 12, 17, 21.5, 25.5, 28, 30.5, 34)
 CORNEA_SUNK_MM = 0.05  # its edge lies under the white: two surfaces at one depth would flicker
 IRIS_END_DEG = 32.0  # the rings within are the iris and the slope down to it
-IRIS_DEPTH_MM = 2.72  # from the cornea's apex to the iris's edge, as in life
+IRIS_DEPTH_MM = 2.5  # from the cornea's apex to the iris's edge: deeper, from the side a white rim shows behind it
 # Towards the pupil it goes back: in a hollow disc light from above brightens the lower half, as a lens does in life.
 IRIS_SLOPE = 0.08
 IRIS_SOFTNESS_MM = 0.1  # how softly the white bends down to it
