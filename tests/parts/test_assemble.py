@@ -77,6 +77,22 @@ def test_only_the_skin_takes_the_skins_maps(rig):
     painted = {mesh.name for mesh in rig.meshes if mesh.material.albedo}
     assert {"eye_left", "teeth_upper", "tongue", "gums_lower", "lashes_right"} <= painted
     assert not {"cornea_left", "cornea_right"} & painted
+
+
+def test_an_eye_is_lit_as_its_cornea_bulges(hm08, person, rig):
+    """Its normal map bends the flat iris's normals to the cornea's, and leaves the white and the back alone."""
+    eye = next(mesh for mesh in rig.meshes if mesh.name == "eye_right")
+    image = rig.maps[eye.material.normal]
+    size = len(image)
+    bend = (image.astype(float) - 128.0) / 127.0
+    aside = bend[size // 2, int(0.68 * size)]  # on the iris, u 0.18 to the person's left of the pupil
+    assert np.allclose(bend[size // 2, size // 2], [0, 0, 1], atol=0.05) and 0.3 < aside[0] < 0.8
+    assert np.allclose(aside, np.linalg.norm(aside) * np.array([aside[0], 0, aside[2]]), atol=0.05)
+    v, u = (np.indices((size, size)) + 0.5) / size - 0.5
+    assert (image[np.hypot(u, v) > 0.29] == [128, 128, 255]).all()
+    whole = replace(hm08, parts=tuple(part for part in hm08.parts if not part.name.startswith("cornea")))
+    plain = build_rig(replace(person, template=whole), np.zeros((52, *person.vertices.shape)))
+    assert next(mesh.material for mesh in plain.meshes if mesh.name == "eye_right").normal is None
     assert {name for mesh in rig.meshes for name in (mesh.material.albedo, mesh.material.normal) if name} <= set(
         rig.maps
     )

@@ -38,9 +38,9 @@ N_MODES = 100
 JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 MATERIALS = {
     "skin": {"color": (0.60, 0.38, 0.29), "roughness": 0.55, "alpha": 1.0},
-    # Matt, as the iris is: where the white bends down to it a gloss would be a bright ring. What shines is the cornea.
-    "eye": {"color": (0.85, 0.83, 0.80), "roughness": 0.5, "alpha": 1.0},
-    "cornea": {"color": (0.0, 0.0, 0.0), "roughness": 0.03, "alpha": 0.06},
+    "eye": {"color": (0.85, 0.83, 0.80), "roughness": 0.12, "alpha": 1.0},
+    # Hardly there: the eye has the catch light, and two of them would stand beside each other.
+    "cornea": {"color": (0.0, 0.0, 0.0), "roughness": 0.03, "alpha": 0.04},
     "teeth": {"color": (0.82, 0.77, 0.67), "roughness": 0.18, "alpha": 1.0, "paint": "teeth", "cells": CELLS},
     "tongue": {"color": (0.50, 0.19, 0.18), "roughness": 0.5, "alpha": 1.0, "paint": "tongue"},
     "gums": {"color": (0.52, 0.20, 0.19), "roughness": 0.5, "alpha": 1.0, "paint": "gums", "double_sided": True},
