@@ -202,7 +202,7 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
         raise ValueError("paint_eye: the part's UVs cover no texel")
     directions = interpolate(vertices, faces, face[seen], barycentric[seen]) - ball.center
     if not inner:
-        directions = _raised(directions, ball)
+        directions = _raised(directions, ball, look.iris_deg + _RIM_DEG)
     colors = eye_colors(directions, ball.axis, look)
     if inner:
         colors[np.degrees(angle_from(ball.axis, directions)) > look.iris_deg + _RIM_DEG] = _DARK
@@ -239,11 +239,11 @@ def paint_bulge(vertices, faces, uv, uv_faces, ball, cornea, size=256):
     return image
 
 
-def _raised(offsets, ball):
-    """Points (k, 3) from the eye's centre; those of a hollow in front (an iris set back) brought to the ball's surface
-    along its axis: so they are as large as on a ball, seen from in front."""
-    along = offsets @ ball.axis
-    short = (along > 0) & (np.linalg.norm(offsets, axis=1) < ball.radius)
+def _raised(offsets, ball, degrees):
+    """Points (k, 3) from the eye's centre; those of a hollow (an iris set back) within degrees of the axis brought to
+    the ball's surface along it: so they are as large as on a ball, seen from in front."""
+    along, length = offsets @ ball.axis, np.linalg.norm(offsets, axis=1)
+    short = (length < ball.radius) & (along > np.cos(np.radians(degrees)) * length)
     across = offsets[short] - along[short, None] * ball.axis
     height = np.sqrt(ball.radius**2 - (across**2).sum(axis=1))
     raised = offsets.copy()
