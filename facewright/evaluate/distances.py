@@ -43,10 +43,10 @@ def in_region(mask, faces, samples_faces, barycentric):
 
 
 def surface_faces(template):
-    """(m,) bool: the faces of a Template that distances are measured on: the skin and the eyeballs."""
+    """(m,) bool: the faces of a Template that distances are measured on: the skin, the eyeballs and corneas."""
     mask = np.zeros(len(template.faces), bool)
     for part in template.parts:
-        if part.name in ("skin", "eye_left", "eye_right"):
+        if part.name == "skin" or part.name.startswith(("eye_", "cornea_")):
             mask[part.face_slice] = True
     return mask
 

@@ -19,7 +19,7 @@ def measure_rig_distances(rig, scan, *, count=40000):
 
     rig a data.Rig, scan a data.Scan in the rig's own frame (our frame, mm)
     """
-    meshes = [mesh for mesh in rig.meshes if mesh.name in ("skin", "eye_left", "eye_right")]
+    meshes = [mesh for mesh in rig.meshes if mesh.name == "skin" or mesh.name.startswith(("eye_", "cornea_"))]
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.vstack([mesh.vertices for mesh in meshes])
     faces = np.vstack([mesh.faces + offset for mesh, offset in zip(meshes, offsets)])

@@ -9,10 +9,10 @@ import numpy as np
 
 from facewright.data import Material, Mesh, Rig
 from facewright.parts.fit import fit_skeleton
-from facewright.parts.iris import EyeLook, paint_eye
+from facewright.parts.iris import EyeLook, paint_bulge, paint_eye
 from facewright.parts.mouth_light import mouth_light, parts_behind_lips, shaded
 from facewright.parts.paint import PAINTERS, plain_map
-from facewright.transfer.eyeball import measure_eyeball
+from facewright.transfer.eyeball import eye_parts, measure_eyeball
 from facewright.transfer.halves import split_in_halves
 from facewright.working_set import read_working_set
 
@@ -163,7 +163,12 @@ def _material(template, part, maps, options, light):
             plain |= {"double_sided": True, "roughness": 1.0}
         else:
             plain["double_sided"] = False
-        return Material(part.name, **plain, albedo=name), {name: _painted(template, part, options.eyes)}
+        painted = {name: _painted(template, part, options.eyes)}
+        cornea = _cornea_before(template, part)
+        bulge = f"{part.name}_normal" if cornea is not None else None
+        if cornea is not None:
+            painted[bulge] = paint_bulge(*_eye_in_its_uvs(template, part), _mesh_of(template, cornea))
+        return Material(part.name, **plain, albedo=name, normal=bulge), painted
     behind = [other for other in parts_behind_lips(template) if other.material == part.material]
     if options.painted and ("paint" in look or part in behind):
         name = f"{part.material}_albedo"
@@ -177,13 +182,22 @@ def _material(template, part, maps, options, light):
 
 def _painted(template, part, look):
     """The texture of one eye part, painted on the template's eye, which looks straight ahead as the person's does."""
-    start = part.vertices[0]
-    return paint_eye(
-        template.vertices[part.vertex_slice],
-        template.faces[part.face_slice] - start,
-        template.uv,
-        template.uv_faces[part.face_slice],
-        measure_eyeball(template, part.attach.removeprefix("eye_")),
-        look,
-        inner=part.name != part.attach,
-    )
+    return paint_eye(*_eye_in_its_uvs(template, part), look, inner=part.name != part.attach)
+
+
+def _eye_in_its_uvs(template, part):
+    """vertices, faces, uv, uv_faces and Eyeball of a part of an eye, as paint_eye takes them."""
+    ball = measure_eyeball(template, part.attach.removeprefix("eye_"))
+    return *_mesh_of(template, part), template.uv, template.uv_faces[part.face_slice], ball
+
+
+def _mesh_of(template, part):
+    """Vertices and faces of a part by itself."""
+    return template.vertices[part.vertex_slice], template.faces[part.face_slice] - part.vertices[0]
+
+
+def _cornea_before(template, part):
+    """The clear part before an eyeball that has its iris in its own mesh, else None."""
+    others = [other for other in eye_parts(template, part.attach.removeprefix("eye_")) if other is not part]
+    clear = all(float(template.materials[other.material].get("alpha", 1.0)) < 1.0 for other in others)
+    return others[0] if part.name == part.attach and others and clear else None

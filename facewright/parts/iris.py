@@ -9,11 +9,14 @@ from scipy.ndimage import distance_transform_edt
 
 from facewright.mesh.closest import interpolate
 from facewright.mesh.fade import smooth_step
-from facewright.mesh.raster import raster_uv
+from facewright.mesh.normals import normalized, vertex_normals
+from facewright.mesh.raster import RayScene, raster_uv
 from facewright.mesh.render import linear_to_srgb
+from facewright.mesh.tangents import corner_tangents, to_tangent_space
 from facewright.transfer.eyeball import angle_from
 
 _RIM_DEG = 16.0
+_FADE_MM = 0.1  # height of a cornea above the white from which on it alone says how light falls
 BROWN, WHITE = (0.16, 0.115, 0.07), (0.78, 0.74, 0.70)
 _VEINS, _VEINS_DEG, _SECTOR = 34, (34.0, 100.0), 0.45
 _DARK = 0.004  # linear: what is seen through a pupil
@@ -198,6 +201,8 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
     if not seen.any():
         raise ValueError("paint_eye: the part's UVs cover no texel")
     directions = interpolate(vertices, faces, face[seen], barycentric[seen]) - ball.center
+    if not inner:
+        directions = _raised(directions, ball, look.iris_deg + _RIM_DEG)
     colors = eye_colors(directions, ball.axis, look)
     if inner:
         colors[np.degrees(angle_from(ball.axis, directions)) > look.iris_deg + _RIM_DEG] = _DARK
@@ -205,3 +210,42 @@ def paint_eye(vertices, faces, uv, uv_faces, ball, look=None, inner=False):
     image[seen] = colors
     rows, columns = distance_transform_edt(~seen, return_distances=False, return_indices=True)
     return (linear_to_srgb(np.clip(image[rows, columns], 0, 1)) * 255 + 0.5).astype(np.uint8)
+
+
+def paint_bulge(vertices, faces, uv, uv_faces, ball, cornea, size=256):
+    """A tangent-space normal map (size, size, 3) uint8 that lights an eye part as the cornea before it bulges.
+
+    cornea  (vertices, faces) of the clear part. Viewers fade what a clear surface mirrors, so the catch light has to be
+            the iris's own: on a flat one it would be all or nothing, and a bright ring where the white bends down to it
+    """
+    face, barycentric = raster_uv(uv, uv_faces, size)
+    seen = face >= 0
+    face, barycentric = face[seen], barycentric[seen]
+    own = vertex_normals(vertices, faces)
+    tangents, signs = corner_tangents(vertices, faces, own, uv, uv_faces)
+    tangent = normalized(np.einsum("kc,kcd->kd", barycentric, tangents[face]))
+    normal = normalized(interpolate(own, faces, face, barycentric))
+    points = interpolate(vertices, faces, face, barycentric)
+    start = 2.0 * ball.radius
+    hits = RayScene(*cornea).cast(points + start * ball.axis, np.broadcast_to(-ball.axis, points.shape), start)
+    met = (hits.face >= 0) & ((points - ball.center) @ ball.axis > 0.0)
+    bulge = interpolate(vertex_normals(*cornea), cornea[1], hits.face[met], hits.barycentric[met])
+    share = smooth_step(start - hits.distance[met], 0.0, _FADE_MM)[:, None]
+    wanted = normal.copy()
+    wanted[met] = normalized(share * bulge + (1.0 - share) * normal[met])
+    bend = normalized(to_tangent_space(wanted, normal, tangent, signs[face]))
+    image = np.full((size, size, 3), (128, 128, 255), np.uint8)
+    image[seen] = np.clip(np.rint(127.0 * bend + 128.0), 0, 255)
+    return image
+
+
+def _raised(offsets, ball, degrees):
+    """Points (k, 3) from the eye's centre; those of a hollow (an iris set back) within degrees of the axis brought to
+    the ball's surface along it: so they are as large as on a ball, seen from in front."""
+    along, length = offsets @ ball.axis, np.linalg.norm(offsets, axis=1)
+    short = (length < ball.radius) & (along > np.cos(np.radians(degrees)) * length)
+    across = offsets[short] - along[short, None] * ball.axis
+    height = np.sqrt(ball.radius**2 - (across**2).sum(axis=1))
+    raised = offsets.copy()
+    raised[short] = across + height[:, None] * ball.axis
+    return raised

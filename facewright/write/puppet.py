@@ -120,6 +120,7 @@ def rig_drawables(rig, textured):
         elif material.albedo in rig.maps:
             looks |= {
                 "texture": _at_most(rig.maps[material.albedo], CLAY_MAP_PX),
+                "normal_map": rig.maps.get(material.normal),
                 "uv": mesh.uv,
                 "uv_faces": mesh.uv_faces,
             }

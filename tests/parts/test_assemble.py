@@ -38,7 +38,9 @@ def test_targets_are_all_or_none(rig):
     assert rig.plain().target_names == ARKIT_SHAPES
     by_name = {mesh.name: mesh for mesh in rig.meshes}
     assert by_name["teeth_upper"].deltas is None
-    assert all(len(by_name[name].deltas) == 52 + 16 for name in ("skin", "eye_left", "teeth_lower", "tongue"))
+    assert all(
+        len(by_name[name].deltas) == 52 + 16 for name in ("skin", "eye_left", "cornea_left", "teeth_lower", "tongue")
+    )
 
 
 def test_the_full_rig_has_halves_in_place_of_their_sums(rig):
@@ -56,7 +58,13 @@ def test_the_full_rig_has_halves_in_place_of_their_sums(rig):
 def test_parts_hang_on_their_bones(rig):
     names = rig.skeleton.names
     by_name = {mesh.name: mesh for mesh in rig.meshes}
-    for mesh, bone in (("eye_left", "eye_left"), ("teeth_upper", "head"), ("teeth_lower", "jaw"), ("tongue", "jaw")):
+    for mesh, bone in (
+        ("eye_left", "eye_left"),
+        ("cornea_right", "eye_right"),
+        ("teeth_upper", "head"),
+        ("teeth_lower", "jaw"),
+        ("tongue", "jaw"),
+    ):
         assert (by_name[mesh].skin_weights[:, names.index(bone)] == 1).all(), mesh
     assert all(np.allclose(mesh.skin_weights.sum(axis=1), 1) for mesh in rig.meshes)
 
@@ -68,6 +76,23 @@ def test_only_the_skin_takes_the_skins_maps(rig):
     assert all(mesh.material.albedo != "albedo" for mesh in rig.meshes[1:])
     painted = {mesh.name for mesh in rig.meshes if mesh.material.albedo}
     assert {"eye_left", "teeth_upper", "tongue", "gums_lower", "lashes_right"} <= painted
+    assert not {"cornea_left", "cornea_right"} & painted
+
+
+def test_an_eye_is_lit_as_its_cornea_bulges(hm08, person, rig):
+    """Its normal map bends the flat iris's normals to the cornea's, and leaves the white and the back alone."""
+    eye = next(mesh for mesh in rig.meshes if mesh.name == "eye_right")
+    image = rig.maps[eye.material.normal]
+    size = len(image)
+    bend = (image.astype(float) - 128.0) / 127.0
+    aside = bend[size // 2, int(0.68 * size)]  # on the iris, u 0.18 to the person's left of the pupil
+    assert np.allclose(bend[size // 2, size // 2], [0, 0, 1], atol=0.05) and 0.3 < aside[0] < 0.8
+    assert np.allclose(aside, np.linalg.norm(aside) * np.array([aside[0], 0, aside[2]]), atol=0.05)
+    v, u = (np.indices((size, size)) + 0.5) / size - 0.5
+    assert (image[np.hypot(u, v) > 0.29] == [128, 128, 255]).all()
+    whole = replace(hm08, parts=tuple(part for part in hm08.parts if not part.name.startswith("cornea")))
+    plain = build_rig(replace(person, template=whole), np.zeros((52, *person.vertices.shape)))
+    assert next(mesh.material for mesh in plain.meshes if mesh.name == "eye_right").normal is None
     assert {name for mesh in rig.meshes for name in (mesh.material.albedo, mesh.material.normal) if name} <= set(
         rig.maps
     )
@@ -101,6 +126,20 @@ def test_an_eye_has_pupil_iris_and_white():
     assert light[:2].max() < 0.01 < 0.05 < light[2] < 0.3 and light[3:].min() > 0.6
 
 
+def test_an_iris_that_is_set_back_is_painted_as_large_as_on_a_ball(hm08):
+    """Seen from in front: its vertices have the colours of the ball's surface before them."""
+    part, ball = hm08.part("eye_left"), measure_eyeball(hm08, "left")
+    faces, uv_faces = hm08.faces[part.face_slice] - part.vertices[0], hm08.uv_faces[part.face_slice]
+    points = hm08.vertices[part.vertex_slice]
+    flat, round_ = points.copy(), points.copy()
+    across = np.linalg.norm((points - ball.center)[:, :2], axis=1)
+    front = (across < 0.5 * ball.radius) & (points[:, 2] > ball.center[2])
+    flat[front, 2] = ball.center[2] + 0.8 * ball.radius
+    round_[front, 2] = ball.center[2] + np.sqrt(ball.radius**2 - across[front] ** 2)
+    images = [paint_eye(V, faces, hm08.uv, uv_faces, ball, EyeLook(size=64)).astype(int) for V in (flat, round_)]
+    assert np.abs(images[0] - images[1]).mean() < 0.5
+
+
 def test_the_painted_eye_follows_its_axis_and_uvs(hm08):
     part = hm08.part("eye_left")
     image = paint_eye(
@@ -111,7 +150,8 @@ def test_the_painted_eye_follows_its_axis_and_uvs(hm08):
         measure_eyeball(hm08, "left"),
         EyeLook(size=64),
     )
-    apex = np.argmax(hm08.vertices[part.vertex_slice][:, 2]) + part.vertices[0]
+    axis = np.linalg.norm((hm08.vertices[part.vertex_slice] - measure_eyeball(hm08, "left").center)[:, :2], axis=1)
+    apex = np.argmin(axis) + part.vertices[0]
     u, v = hm08.uv[hm08.uv_faces[part.face_slice][hm08.faces[part.face_slice] == apex][0]]
     pupil = image[min(63, int((1 - v) * 64)), min(63, int(u * 64))]
     assert image.shape == (64, 64, 3) and pupil.max() < 30 and image.max() > 200

@@ -61,9 +61,28 @@ def test_frame_and_eyes(hm08):
     eye = hm08.vertices[hm08.part("eye_left").vertex_slice] - centers[0]
     radius = np.linalg.norm(eye, axis=1)
     assert np.isclose(np.median(radius), 12.0, atol=0.01)
-    front = eye[:, 2].argmax()
-    assert 12.9 < radius[front] < 13.3
-    np.testing.assert_allclose(eye[front, :2], 0.0, atol=1e-9)
+    cornea = hm08.vertices[hm08.part("cornea_left").vertex_slice] - centers[0]
+    front = cornea[:, 2].argmax()
+    assert 12.9 < cornea[front, 2] < 13.3
+    np.testing.assert_allclose(cornea[front, :2], 0.0, atol=1e-9)
+
+
+def test_the_iris_lies_behind_a_cornea_that_leaves_no_gap(hm08):
+    """Nearly flat, 2.5 to 3.3 mm behind the apex; all around, the cornea's edge dips a little into the white."""
+    center = hm08.skeleton.positions[3]
+    eye, cornea = (hm08.part(f"{name}_left") for name in ("eye", "cornea"))
+    points = hm08.vertices[eye.vertex_slice] - center
+    iris = np.hypot(points[:, 0], points[:, 1]) < 5.2
+    iris &= points[:, 2] > 0
+    behind = hm08.vertices[cornea.vertex_slice, 2].max() - center[2] - points[iris, 2]
+    assert iris.sum() > 100 and behind.min() > 2.5 and behind.max() < 3.3
+    balls = [RayScene(hm08.vertices - center, hm08.faces[part.face_slice]) for part in (eye, cornea)]
+    turn = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    for degrees, before in ((1, True), (15, True), (29, True), (33.5, False)):
+        across = np.sin(np.radians(degrees))
+        out = np.stack([across * np.cos(turn), across * np.sin(turn), np.full(90, np.cos(np.radians(degrees)))], axis=1)
+        white, clear = (13.5 - ball.cast(13.5 * out, -out).distance for ball in balls)
+        assert ((clear > white) == before).all() and (before or (white - clear).max() < 0.15)
 
 
 def test_lids_lie_on_the_ball_and_nothing_enters_it(hm08, skin_faces):
@@ -71,8 +90,9 @@ def test_lids_lie_on_the_ball_and_nothing_enters_it(hm08, skin_faces):
     margin = np.unique(np.concatenate([hm08.lines["lid_upper_left"], hm08.lines["lid_lower_left"]]))
     gap = np.linalg.norm(hm08.vertices[margin] - center, axis=1) - 12.0
     assert 0.1 < np.quantile(gap, 0.25) < 0.2 and gap.max() < 2.0
-    eye = hm08.faces[hm08.part("eye_left").face_slice]
-    assert len(self_intersections(hm08.vertices, np.concatenate([skin_faces, eye]))) == 0
+    for name in ("eye_left", "cornea_left"):
+        eye = hm08.faces[hm08.part(name).face_slice]
+        assert len(self_intersections(hm08.vertices, np.concatenate([skin_faces, eye]))) == 0
 
 
 def test_lips_are_closed(hm08, skin_faces):
@@ -186,13 +206,15 @@ def test_closed_lips_stay_closed(hm08):
 @pytest.mark.parametrize(
     ("name", "axis", "sign", "degrees"), [("Up", 1, 1, 25), ("Down", 1, -1, 30), ("Out", 0, 1, 30)]
 )
-def test_eyes_turn_about_their_centres(hm08, name, axis, sign, degrees):
-    part = hm08.part("eye_left").vertex_slice
+@pytest.mark.parametrize("part", ["eye_left", "cornea_left"])
+def test_eyes_turn_about_their_centres(hm08, part, name, axis, sign, degrees):
+    part = hm08.part(part).vertex_slice
     center = hm08.skeleton.positions[3]
     before = hm08.vertices[part] - center
+    np.testing.assert_allclose(before[0, :2], 0.0, atol=1e-9)
     after = before + hm08.shape(f"eyeLook{name}Left")[part]
     np.testing.assert_allclose(np.linalg.norm(after, axis=1), np.linalg.norm(before, axis=1), atol=0.005)
-    gaze = after[before[:, 2].argmax()]
+    gaze = after[0]  # on the axis
     assert np.isclose(np.degrees(np.arcsin(gaze[axis] / np.linalg.norm(gaze))) * sign, degrees, atol=0.1)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from facewright.contact.gaze import gaze_rotation
 from facewright.parts import fit_parts
-from facewright.transfer.eyeball import carried_eyeball, measure_eyeball
+from facewright.transfer.eyeball import carried_eyeball, eye_parts, measure_eyeball
 from facewright.transfer.riders import LidRiders, lid_parts, ride_on_lids
 
 
@@ -53,7 +53,7 @@ def test_strips_keep_off_a_cornea_that_turns(hm08, itself):
     ball = measure_eyeball(hm08, "left")
     R = gaze_rotation("Up", "left")
     deltas = np.zeros((1, *hm08.vertices.shape))
-    eye = hm08.part("eye_left").vertex_slice
+    eye = np.concatenate([np.arange(*part.vertices) for part in eye_parts(hm08, "left")])
     deltas[0, eye] = (hm08.vertices[eye] - ball.center) @ (R - np.eye(3)).T
     moved = hm08.vertices + ride_on_lids(itself, deltas, ("eyeLookUpLeft",))[0]
     strip = hm08.part("occlusion_left").vertex_slice

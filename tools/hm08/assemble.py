@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from hm08.control import build_control
 from hm08.head import build_head
 from hm08.lids import lid_pieces
 from hm08.mouth import deepen_fold
-from hm08.parts import Piece, control_points, eye_pair, mouth_pieces, mouth_rows
+from hm08.parts import Piece, control_points, cornea_pieces, eye_pieces, mouth_pieces, mouth_rows, outermost_eyes
 from hm08.regions import EAR_TARGETS, skin_regions
 from hm08.shapes import build_shapes
 from hm08.shapes.eyes import eye_turn
@@ -38,6 +39,8 @@ JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 MATERIALS = {
     "skin": {"color": (0.60, 0.38, 0.29), "roughness": 0.55, "alpha": 1.0},
     "eye": {"color": (0.85, 0.83, 0.80), "roughness": 0.12, "alpha": 1.0},
+    # Hardly there: the eye has the catch light, and two of them would stand beside each other.
+    "cornea": {"color": (0.0, 0.0, 0.0), "roughness": 0.03, "alpha": 0.04},
     "teeth": {"color": (0.82, 0.77, 0.67), "roughness": 0.18, "alpha": 1.0, "paint": "teeth", "cells": CELLS},
     "tongue": {"color": (0.50, 0.19, 0.18), "roughness": 0.5, "alpha": 1.0, "paint": "tongue"},
     "gums": {"color": (0.52, 0.20, 0.19), "roughness": 0.5, "alpha": 1.0, "paint": "gums", "double_sided": True},
@@ -147,13 +150,10 @@ def _assemble(head, uv, uv_polygons):
     """The Assembly, and the tongue's vertices when it is out."""
     assembly = Assembly()
     assembly.add(Piece("skin", head.V, head.polygons, uv, uv_polygons, head.mirror, "skin", "skin"))
-    eyes = eye_pair(head.eye_center)
-    k = len(eyes["eye_left"][0])
-    for side, name in ((1, "eye_left"), (-1, "eye_right")):
-        vertices, polygons, eye_uv = eyes[name]
-        assembly.add(Piece(name, vertices, polygons, eye_uv, polygons, np.arange(k) + side * k, "eye", name))
     pieces, tongue_out = mouth_pieces()
-    for piece in [*pieces, *lid_pieces(head.V, head.F, head.lines, head.eye_center)]:
+    lids = lid_pieces(head.V, head.F, head.lines, head.eye_center)
+    # What is seen through is drawn in this order: lashes over the cornea.
+    for piece in [*eye_pieces(head.eye_center), *pieces, *cornea_pieces(head.eye_center), *lids]:
         assembly.add(piece)
     return assembly, tongue_out
 
@@ -172,8 +172,9 @@ def _with_parts(skin, turns, head, assembly, tongue_out):
         if name.startswith("eyeLook"):
             side = "eye_left" if name.endswith("Left") else "eye_right"
             center = head.eye_center * ([1, 1, 1] if side == "eye_left" else [-1, 1, 1])
-            part = next(p for p in assembly.parts if p.name == side)
-            deltas[i, part.vertex_slice] = eye_turn(name, vertices[part.vertex_slice], center)
+            for part in assembly.parts:
+                if part.attach == side:
+                    deltas[i, part.vertex_slice] = eye_turn(name, vertices[part.vertex_slice], center)
     return deltas
 
 
@@ -219,7 +220,7 @@ def _operator(control, head, assembly):
             rows = sp.csr_matrix((near.barycentric.ravel(), at), shape=(k, len(head.V))) @ head.S
             blocks.append(sp.hstack([rows, sp.csr_matrix((k, c - control.n_skin + 2))]))
             continue
-        columns, weights = np.array([c + (part.name == "eye_right")]), np.ones((k, 1))
+        columns, weights = np.array([c + (part.attach == "eye_right")]), np.ones((k, 1))
         if part.attach in ("skull", "jaw"):
             columns, weights = mouth_rows(control, vertices)
         at = (np.repeat(np.arange(k), len(columns)), np.tile(columns, k))
@@ -245,12 +246,16 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
     for part in assembly.parts[1:]:
         weights[part.vertex_slice, column.get(part.attach, 1)] = 1.0
     mirror = np.concatenate(assembly.mirror)
-    # Lashes and the like cast no shadow and are not in the landmarks' pictures.
-    solid = tuple(part for part in assembly.parts if not part.attach.startswith("lid_"))
+    # Lashes and the like cast no shadow and are not in the landmarks' pictures; of eyes the outermost surface is.
+    solid = tuple(itertools.takewhile(lambda part: part.material != "cornea", assembly.parts))
     n_solid, f_solid = solid[-1].vertices[1], solid[-1].faces[1]
+    shown = vertices[:n_solid].copy()
+    eyes = outermost_eyes(head.eye_center)
+    shown[n_skin : n_skin + len(eyes)] = eyes
     openness = np.ones(n)
-    openness[:n_solid] = vertex_openness(vertices[:n_solid], faces[:f_solid])
-    landmarks = template_landmarks(vertices[:n_solid], faces[:f_solid], mirror[:n_solid], solid)
+    openness[:n_solid] = vertex_openness(shown, faces[:f_solid])
+    landmarks = template_landmarks(shown, faces[:f_solid], mirror[:n_solid], solid)
+    landmarks = _on_corneas(landmarks, shown, vertices, faces, assembly.parts)
     template = Template(
         vertices=vertices,
         faces=faces,
@@ -274,6 +279,19 @@ def _template(assembly, head, regions, control, deltas, operator, modes, jaw):
     )
     deltas = ride_on_lids(_as_face(template), deltas, list(ARKIT_SHAPES))
     return replace(template, deltas=symmetric_shapes(ARKIT_SHAPES, deltas, mirror))
+
+
+def _on_corneas(landmarks, shown, vertices, faces, parts):
+    """Landmarks with those on the eyes, found on vertices shown (k, 3), brought to the corneas before them."""
+    eyes, corneas = (
+        np.concatenate([np.arange(*part.faces) for part in parts if part.name.startswith(name)])
+        for name in ("eye_", "cornea_")
+    )
+    mine = np.isin(landmarks.faces, eyes)
+    near = Surface(vertices, faces[corneas]).closest(landmarks.positions(shown, faces)[mine])
+    on_faces, barycentric = landmarks.faces.copy(), landmarks.barycentric.copy()
+    on_faces[mine], barycentric[mine] = corneas[near.faces], near.barycentric
+    return replace(landmarks, faces=on_faces, barycentric=barycentric)
 
 
 def _as_face(template):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hm08.eyeball import eyeball
+from hm08.eyeball import cornea, eyeball, outermost
 from hm08.gums import gum_band
 from hm08.teeth import LOWER, UPPER, arch
 from hm08.tongue import tongue
@@ -36,18 +36,36 @@ def mirrored_polygons(polygons):
     return turned
 
 
-def eye_pair(center):
-    """dict of the two eyes: name -> (vertices, polygons, uv); the right one is the left one's mirror image.
+def eye_pieces(center):
+    """Pieces of the two eyes; the right one is the left one's mirror image."""
+    return _eye_pair("eye", eyeball(), center, "eye")
+
+
+def cornea_pieces(center):
+    """Pieces of the two corneas."""
+    return _eye_pair("cornea", cornea(), center, "cornea")
+
+
+def outermost_eyes(center):
+    """(2 n, 3) the vertices of eye_pieces, the left eye's first, raised to the corneas."""
+    left = outermost() + center
+    return np.concatenate([left, left * [-1, 1, 1]])
+
+
+def _eye_pair(name, mesh, center, material):
+    """Pieces of a mesh about the eye's centre (vertices, polygons, uv) and of its mirror image.
 
     Both textures stand upright: u grows to the person's left on both eyes.
     """
-    vertices, polygons, uv = eyeball()
-    left = vertices + center
+    vertices, polygons, uv = mesh
+    left, k = vertices + center, len(vertices)
     # Cut from corner 0 to 2; the mirrored winding keeps corners 0 and 2.
-    return {
-        "eye_left": (left, polygons, uv),
-        "eye_right": (left * [-1, 1, 1], mirrored_polygons(polygons), uv * [-1, 1] + [1, 0]),
-    }
+    turned = mirrored_polygons(polygons)
+    at = np.arange(k)
+    return [
+        Piece(f"{name}_left", left, polygons, uv, polygons, at + k, material, "eye_left"),
+        Piece(f"{name}_right", left * [-1, 1, 1], turned, uv * [-1, 1] + [1, 0], turned, at - k, material, "eye_right"),
+    ]
 
 
 def evenly_cut(vertices, polygons, uv, uv_polygons):
