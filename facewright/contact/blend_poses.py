@@ -27,6 +27,7 @@ def sample_poses(targets):
                 poses.append({name + side: w for name, w in weights.items() for side in ("Left", "Right")})
     for drivers in targets.correctives.values():
         poses += [dict(zip(drivers, weights)) for weights in _BOTH if not drivers[0].startswith("eye")]
+    poses += pair_poses(targets)
     words = read_working_set()
     poses += all_blends(words.expressions, words.visemes)
     known = set(targets.names)
@@ -39,6 +40,12 @@ def plain_poses(targets):
     for names in together(targets.names):
         bases = {CORRECTIVE_BASE[name]: 1.0 for name in names if CORRECTIVE_BASE.get(name) in known}
         poses.append(dict.fromkeys(names, 1.0) | bases)
+    return poses + pair_poses(targets)
+
+
+def pair_poses(targets):
+    """list of {shape: weight}: the pairs that lids and lips must survive."""
+    known, poses = set(targets.names), []
     for pair in (*EYE_PAIRS, *MOUTH_PAIRS, TONGUE_PAIR):
         sided = {name + side for name in pair for side in ("", "Left", "Right")}
         poses.append(dict.fromkeys(sorted(sided & known), 1.0))

@@ -69,7 +69,7 @@ def test_faces_are_seen_in_a_blend_as_the_whole_mesh_shows_them(face, pressed):
     skin, pose = _Skin(face, targets), dict.fromkeys(names, 0.9)
     asked = skin.suspects()
     patch = skin.faces_of(asked)
-    along, turn, _ = patch._look(skin.weights([pose])[:, patch.played])
+    along, turn, _ = patch.look(skin.weights([pose])[:, patch.played])
     moved = skin.V + targets.motion(pose)[face.template.skin.vertex_slice]
     close = turn[0] < 0.3
     assert close.any()

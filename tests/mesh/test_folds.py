@@ -1,8 +1,9 @@
 """A face turned over by its neighbours' measure is found, and laid flat again."""
 
 import numpy as np
+import pytest
 
-from facewright.mesh.folds import folded_by_shape, laid_flat
+from facewright.mesh.folds import folded_by_shape, laid_flat, least_turn
 
 
 def test_turning_a_head_folds_no_shape(sheet, turn):
@@ -41,3 +42,20 @@ def test_what_may_not_give_way_stays(sheet):
     flat = laid_flat(vertices, moved, faces, ease)
     assert np.array_equal(flat[pushed], moved[pushed]) and not len(folded_by_shape(vertices, flat, faces))
     assert np.linalg.norm(flat - moved, axis=1).max() < 1.5
+
+
+def test_the_least_turn_is_that_of_a_singular_value_decomposition():
+    rng = np.random.default_rng(1)
+    covariance, vectors = rng.normal(size=(300, 3, 3)), rng.normal(size=(300, 3))
+    covariance[:100, 2] *= 1e-6  # nearly flat
+    U, _, Vt = np.linalg.svd(covariance)
+    U[np.linalg.det(U @ Vt) < 0, :, 2] *= -1
+    assert least_turn(covariance, vectors) == pytest.approx(np.einsum("mji,mj->mi", U @ Vt, vectors), abs=1e-7)
+
+
+def test_a_turn_that_nothing_tells_is_a_turn_still(turn):
+    vectors = np.eye(3)
+    covariance = np.stack([np.zeros((3, 3)), np.outer([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]), turn(40).T])
+    turned = least_turn(covariance, vectors)
+    assert np.linalg.norm(turned, axis=1) == pytest.approx(1.0)
+    assert turned[2] == pytest.approx(turn(40) @ vectors[2])
