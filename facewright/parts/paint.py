@@ -15,6 +15,7 @@ from facewright.parts.paint_lids import paint_blend, paint_lashes, paint_occlusi
 _IVORY, _NECK, _EDGE = (0.93, 0.905, 0.855), (0.90, 0.85, 0.775), (0.885, 0.885, 0.87)  # shades A1 to A2
 _GUM, _MARGIN, _FOLD = (0.78, 0.49, 0.47), (0.83, 0.58, 0.55), (0.66, 0.29, 0.30)
 _TONGUE, _COAT, _BENEATH = (0.76, 0.43, 0.43), (0.80, 0.58, 0.56), (0.66, 0.31, 0.33)
+_THROAT = (0.48, 0.18, 0.17)
 
 
 def paint_teeth(look, size=1024):
@@ -79,7 +80,8 @@ def paint_tongue(look, size=512):
     color = color * (1 - 0.16 * groove)[..., None]
     veins = np.exp(-(((side - 0.86) / 0.03) ** 2)) * _step(0.4, 0.7, v)
     color = _mix(color, (0.45, 0.26, 0.36), 0.4 * veins[..., None])
-    return _image(color)
+    # What drops into the throat is as dark as that, or it would stand behind the tongue like a wall.
+    return _image(_mix(color, _THROAT, _step(0.32, 0.16, v)[..., None]))
 
 
 PAINTERS = {
