@@ -5,10 +5,11 @@ from __future__ import annotations
 import igl
 import numpy as np
 
+from facewright.mesh.adjacency import touching
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import dot, face_normals, lengths, vertex_normals
 
-_BEHIND_MM = 0.2
+_BEHIND_MM, _OFF_MM = 0.2, 0.02
 _MOST_MM = 8.0  # skin this deep in a tooth has come from elsewhere
 _FACING = 0.2  # cosine with the way out of the arch, above which a face belongs to its outer side
 
@@ -32,6 +33,9 @@ class Teeth:
         self._tree.init(self.vertices, self.faces)
         self._to_affine = np.linalg.pinv(np.column_stack([self.vertices, np.ones(len(vertices))]))
         self.solid = self._is_solid()
+        # Teeth that touch reach into each other: what lies before a wall that a neighbour hides is in that neighbour.
+        before = self.vertices + _OFF_MM * vertex_normals(self.vertices, self.faces)
+        self._bare = ~touching(self._winding(before) > 0.5, self.faces)
 
     def way_out(self, points, moved):
         """Ways out of the teeth (k, 3) for points (k, 3), zero outside, and (k,) clearances.
@@ -57,9 +61,9 @@ class Teeth:
         return result, clearance * _least_stretch(A)
 
     def _before_all(self, points):
-        """(k,) distance of points (k, 3) to the row, 0 for those behind its nearest face."""
+        """(k,) distance of points (k, 3) to the row, 0 for those behind its nearest face or near one that is hidden."""
         nearest, faces, distance = self._surface.nearest(points)
-        before = dot(nearest - points, self._surface_normals[faces]) <= 0
+        before = (dot(nearest - points, self._surface_normals[faces]) <= 0) & self._bare[faces]
         return np.where(before, distance, 0.0)
 
     def _winding(self, points):
