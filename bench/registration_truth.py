@@ -18,6 +18,7 @@ from cases import SEEDS, find_benchmark_template, fitting_template, make_case
 from common import Verdict, print_table
 from meshmonk_runner import is_available, run_meshmonk
 from PIL import Image
+from threadpoolctl import threadpool_limits
 
 from facewright.evaluate.distances import benchmark_scale, interpupillary_mm
 from facewright.evaluate.quality import measure_quality
@@ -105,7 +106,8 @@ def run_template(name, seeds, with_meshmonk, verdict, pictures=None):
         cleaned, _ = clean_scan(case.scan)
         found = find_landmarks(cleaned)
         began = time.perf_counter()
-        face = register(found.scan, found.landmarks, fitted_with)
+        with threadpool_limits(1, user_api="blas"):  # as in the job
+            face = register(found.scan, found.landmarks, fitted_with)
         row = figures(template, face.fit, found, case, time.perf_counter() - began)
         ours.append(row)
         if pictures:

@@ -17,15 +17,16 @@ def sphere_directions(count):
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
 
 
-def vertex_openness(vertices, faces, *, n_directions=128, offset_mm=0.05, subset=None):
+def vertex_openness(vertices, faces, *, n_directions=128, offset_mm=0.05, subset=None, scene=None):
     """(n,) in 0..1: the share of directions of a vertex's hemisphere that reach the outside; 0 without faces.
 
     vertices (n, 3) mm, faces (m, 3), everything that casts shadows; n_directions over the whole sphere, so that
     about half of them count per vertex; offset_mm lifts the origins off the surface
     subset (k,) indices: only these vertices are asked, and (k,) values come back
+    scene  the mesh's raster.RayScene, from whoever has it already
     """
     normals = vertex_normals(vertices, faces)
-    scene = RayScene(vertices, faces)
+    scene = RayScene(vertices, faces) if scene is None else scene
     if subset is not None:
         vertices, normals = vertices[subset], normals[subset]
     origins = vertices + offset_mm * normals

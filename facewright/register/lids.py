@@ -71,23 +71,23 @@ def open_eyes(scan, pairs, closed):
     """
     colors = surface_colors(scan)
     index = {name: i for i, name in enumerate(pairs.names)}
-    found = {}
+    rays, found = RayScene(scan.vertices, scan.faces), {}
     for side, lids in LIDS.items() if colors is not None else ():
         names = [[f"mp{number}" for number in numbers] for numbers in lids]
         if closed[side] or not all(name in index and not pairs.by_hand[index[name]] for name in names[0] + names[1]):
             continue
         upper, lower = (pairs.points[[index[name] for name in lid]][:: 1 if side == "left" else -1] for lid in names)
-        borders = lid_borders(scan, colors, upper, lower)
+        borders = lid_borders(rays, colors, upper, lower)
         if borders is not None:
             found[side] = borders
     return found
 
 
-def lid_borders(scan, colors, upper, lower):
+def lid_borders(rays, colors, upper, lower):
     """(upper Border, lower Border) of an open eye, its corners apart, or None.
 
-    colors: function (faces (k,), barycentric (k, 3)) -> (k, 3) sRGB 0..1; upper, lower (k, 3) landmarks of both lids
-    from the person's right to left, which share their ends
+    rays: the scan's raster.RayScene; colors: function (faces (k,), barycentric (k, 3)) -> (k, 3) sRGB 0..1
+    upper, lower (k, 3) landmarks of both lids from the person's right to left, which share their ends
     """
     R = line_frame(upper, FORWARD)
     center = (upper[0] + upper[-1]) / 2
@@ -96,7 +96,7 @@ def lid_borders(scan, colors, upper, lower):
     x, y = (np.arange(first, last, STEP_MM) for first, last in zip(lowest, highest))
     across, up = (axis.ravel() for axis in np.meshgrid(x, y))
     origins = np.column_stack([across, up, np.full(len(up), FROM_MM)]) @ R + center
-    hits = RayScene(scan.vertices, scan.faces).cast(origins, np.broadcast_to(-R[2], origins.shape))
+    hits = rays.cast(origins, np.broadcast_to(-R[2], origins.shape))
     hit = hits.face >= 0
     seen = np.full((len(hit), 3), np.nan)
     seen[hit] = colors(hits.face[hit], hits.barycentric[hit])

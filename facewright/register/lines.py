@@ -82,7 +82,8 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     middle = np.interp(columns, local[order, 0], local[order, 1])
     reach = options.half_band_mm + 2 * max(options.widths_mm)
     offsets = np.arange(-reach, reach + 1e-9, options.step_mm)
-    depth, dark = _depth_image(vertices, faces, R, center, columns, middle, offsets, darkness)
+    rays = RayScene(vertices, faces)
+    depth, dark = _depth_image(rays, R, center, columns, middle, offsets, darkness)
     strength = _valley_strength(depth, offsets, options)
     evidence = np.minimum(strength / DEEP_MM, 2.0) + np.minimum(_dark_strength(dark, options) / DARK, 1.0)
     inside = np.abs(offsets) <= options.half_band_mm
@@ -94,7 +95,7 @@ def trace_crease(vertices, faces, line, forward, options=None, darkness=None):
     path_strength = strength[along, rows]
     trust = np.clip(path_strength / DEEP_MM, 0.05, 1.0)
     height = _smoothed(middle + offsets[rows], trust, options.step_mm)
-    height = height + _to_the_slit(vertices, faces, R, center, columns, height)
+    height = height + _to_the_slit(rays, R, center, columns, height)
     points_depth = gaussian_filter1d(depth[along, rows], 0.4 / options.step_mm, mode="nearest")
     start, stop = _ends(path_strength, columns, local[0, 0], local[-1, 0], options)
     points = np.stack([columns, height, points_depth], axis=1)[start:stop]
@@ -114,12 +115,12 @@ def _smoothed(height, trust, step_mm):
     return gaussian_filter1d(height * trust, width / step_mm, mode="nearest") / weights
 
 
-def _depth_image(vertices, faces, R, center, columns, middle, offsets, darkness):
+def _depth_image(rays, R, center, columns, middle, offsets, darkness):
     """(columns, offsets) depth towards the viewer, holes filled from the neighbours, and darkness or None."""
     x = np.repeat(columns, len(offsets))
     y = (middle[:, None] + offsets[None, :]).ravel()
     origins = np.stack([x, y, np.full(len(x), 200.0)], axis=1) @ R + center
-    hits = RayScene(vertices, faces).cast(origins, np.broadcast_to(-R[2], origins.shape))
+    hits = rays.cast(origins, np.broadcast_to(-R[2], origins.shape))
     depth = np.where(hits.face >= 0, 200.0 - hits.distance, np.nan).reshape(len(columns), len(offsets))
     bad = ~np.isfinite(depth)
     fill = np.nanmedian(depth, axis=1, keepdims=True)
@@ -170,11 +171,11 @@ def _dark_strength(dark, options):
     return np.maximum(np.mean(levels, axis=0), 0.0)
 
 
-def _to_the_slit(vertices, faces, R, center, columns, height):
+def _to_the_slit(rays, R, center, columns, height):
     """(columns,) how far across the line the bottom of the narrow valley lies from a path at height (columns,), mm."""
     reach = SLIT_REACH_MM + SLIT_WIDTH_MM
     offsets = np.arange(-reach, reach + 1e-9, SLIT_STEP_MM)
-    depth, _ = _depth_image(vertices, faces, R, center, columns, height, offsets, None)
+    depth, _ = _depth_image(rays, R, center, columns, height, offsets, None)
     per_mm = 1.0 / (columns[1] - columns[0])
     smooth = gaussian_filter1d(gaussian_filter1d(depth, 0.3 * per_mm, axis=0), 1.0, axis=1)
     narrow = 0.5 * _second_difference(smooth, SLIT_WIDTH_MM, SLIT_STEP_MM)

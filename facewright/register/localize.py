@@ -51,13 +51,13 @@ class LocalizedBasis:
         mixed = self.mixture.astype(np.float32) @ pieces.reshape(len(pieces), -1)
         return mixed.reshape(len(self), len(rows), 3).astype(float)
 
-    def along(self, alpha):
-        """(n, 3) the displacement of the whole head by alpha (j,) standard deviations of each mode."""
+    def along(self, alpha, rows=slice(None)):
+        """(n, 3) the displacement of the head, or of rows (a slice) of it, by alpha (j,) deviations of each mode."""
         shares = alpha @ self.mixture  # (i + w r,)
         i, r = len(self.basis), self.windows.shape[1]
-        result = np.tensordot(shares[:i], self.basis, 1)
+        result = np.tensordot(shares[:i], self.basis[:, rows], 1)
         for mode, share in zip(self.basis, shares[i:].reshape(-1, r)):
-            result += (self.windows @ share)[:, None] * mode
+            result += (self.windows[rows] @ share)[:, None] * mode[rows]
         return result
 
 

@@ -80,9 +80,11 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
     sampled = sample_rows(weights, SAMPLES)
     areas = lumped_mass(mean, faces)[sampled] * weights[sampled]
     areas /= areas.sum()
+    skin = slice(0, faces.max() + 1)  # what else the head has is asked for at the end
     information = options.n_effective / options.sigma_mm**2
     landmark_model = _project(landmark_rows, mean, coarse, deltas)
-    linear = np.concatenate([coarse.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()  # (3, k, i + e)
+    modes = basis.at(sampled)  # of which the coarse ones are the first
+    linear = _by_axis(modes[: len(coarse)], deltas[:, sampled])
     _follow(state, landmark_model, landmark_points, landmark_weights, options)
     for iteration in range(options.iterations):
         if iteration == options.iterations - options.fine_iterations:
@@ -90,9 +92,9 @@ def fit_model(mean, basis, expressions, faces, weights, rules, target, landmarks
             state.refine(basis)
             information = options.fine_n_effective / options.fine_sigma_mm**2
             landmark_model = _project(landmark_rows, mean, basis, deltas)
-            linear = np.concatenate([basis.at(sampled), deltas[:, sampled]]).transpose(2, 1, 0).copy()
+            linear = _by_axis(modes, deltas[:, sampled])
         progress = iteration / max(1, options.iterations - 1)
-        vertices = state.vertices()
+        vertices = state.vertices(skin)
         normals = vertex_normals(vertices, faces)
         reach = 25.0 * (1 - progress) + 6.0
         matches = target.match(vertices[sampled], normals[sampled], max_distance=reach, tau=max(2.0, reach / 3))
@@ -134,6 +136,11 @@ def sample_rows(weights, count):
     """Indices of trusted vertices (weights (n,) above 0), thinned evenly to about count."""
     rows = np.flatnonzero(weights > 0)
     return rows[:: max(1, len(rows) // count)]
+
+
+def _by_axis(modes, deltas):
+    """(3, k, i + e) of modes (i, k, 3) and the deltas (e, k, 3) of expressions."""
+    return np.concatenate([modes, deltas]).transpose(2, 1, 0).copy()
 
 
 def _project(matrix, mean, basis, expressions):
@@ -182,8 +189,8 @@ class _State:
         """Points (k, 3) of the person at rest with the expressions (e, k, 3) put on, where the scan has them."""
         return self.s * (shape + np.tensordot(self.expression, expressions, 1)) @ self.R.T + self.t
 
-    def vertices(self):
-        return self.placed(self.mean + self.basis.along(self.alpha), self.expressions)
+    def vertices(self, rows=slice(None)):
+        return self.placed(self.mean[rows] + self.basis.along(self.alpha, rows), self.expressions[:, rows])
 
     def rest(self, vertices):
         """The person's vertices (n, 3) with the expressions taken off."""

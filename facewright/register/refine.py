@@ -35,6 +35,7 @@ from facewright.register.model import sample_rows
 SHARE, FINE_MM, LENGTH_MM = 0.2, 1.5, 25.0
 SIMILARITY_MM = 30.0
 SAMPLES, ROUNDS = 900, 5
+_PIECE = 256  # rows of a kernel at a time
 REACH_MM, TAU_MM = 6.0, 2.0
 SIGMA_MM, N_EFFECTIVE, N_FACETS = 0.5, 600.0, 200.0
 """What the process cannot explain, and how many independent observations a scan counts as, and one of facets."""
@@ -102,11 +103,17 @@ class _Frame:
 
 def _kernel(a, b):
     """(j, k) of points a (j, 3) and b (k, 3), in single precision: the exponentials take the time."""
-    a, b = (points.astype(np.float32) / (np.sqrt(2.0, dtype=np.float32) * np.float32(LENGTH_MM)) for points in (a, b))
-    result = 2.0 * (a @ b.T)
-    result -= (a**2).sum(axis=1)[:, None]
-    result -= (b**2).sum(axis=1)
-    return np.exp(np.minimum(result, 0.0, out=result), out=result)
+    a, b = (points.astype(np.float32) / np.float32(LENGTH_MM) for points in (a, b))
+    # -|a - b|^2 / 2 as one product; by pieces that the processor's cache holds, which takes half the time.
+    one_a, one_b = (np.ones((len(points), 1), np.float32) for points in (a, b))
+    squares_a, squares_b = (-0.5 * (points**2).sum(axis=1, keepdims=True) for points in (a, b))
+    left, right = np.hstack([a, squares_a, one_a]), np.hstack([b, one_b, squares_b]).T
+    result = np.empty((len(a), len(b)), np.float32)
+    for start in range(0, len(a), _PIECE):
+        piece = result[start : start + _PIECE]
+        np.matmul(left[start : start + _PIECE], right, out=piece)
+        np.exp(np.minimum(piece, 0.0, out=piece), out=piece)
+    return result
 
 
 def _similarity(points):
@@ -143,6 +150,6 @@ def _displacement(points, basis, sites, forces):
     near = _kernel(points, sites.points)
     local = SHARE * (near @ shares.T.astype(np.float32)) + (1.0 - SHARE) * shares.sum(axis=1)  # (n, i)
     result = np.einsum("ni,inc->nc", local, basis, optimize=True)
-    result += FINE_MM**2 * near @ forces.astype(np.float32)
+    result += near @ (FINE_MM**2 * forces).astype(np.float32)
     similar = np.einsum("gkc,kc->g", _similarity(sites.points), forces)
     return result + np.tensordot(similar, _similarity(points), 1)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
 from facewright.data import Face
 from facewright.mesh.openness import vertex_openness
+from facewright.mesh.raster import RayScene
 from facewright.register.colors import surface_colors
 from facewright.register.correspond import Target
 from facewright.register.ears import ear_motion, hidden_ears
@@ -77,8 +79,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     skin_points = landmarks.positions(scan.vertices, scan.faces)[smooth]
     target.tell_skin(skin_points, hair_by_color(scan, skin_points))
     pairs = landmark_pairs(scan, landmarks, template, placed)
-    face, outer = template.regions["face"], template.regions["outer"]
-    basis = localized_basis(template.vertices, template.identity_basis, face, outer)
+    basis = _localized_basis(template)
     closed, borders, pairs = _read_eyes(scan, template, basis, pairs, options.model)
     edge_mm = face_edge_mm(scan.vertices, scan.faces)
     finely = edge_mm <= FACETS_MM
@@ -134,11 +135,19 @@ def register(scan, landmarks, template, options=None, placed=()):
     )
 
 
+@lru_cache(maxsize=1)
+def _localized_basis(template):
+    """The localised modes of a Template, made once for all scans that it is fitted to."""
+    face, outer = template.regions["face"], template.regions["outer"]
+    return localized_basis(template.vertices, template.identity_basis, face, outer)
+
+
 def _openness(vertices, faces):
     """(n,) as vertex_openness, told from a quarter of the directions where it is plain that the surface is open."""
-    openness = vertex_openness(vertices, faces, n_directions=32)
+    rays = RayScene(vertices, faces)
+    openness = vertex_openness(vertices, faces, n_directions=32, scene=rays)
     doubtful = np.flatnonzero(openness < PLAINLY_OPEN)
-    openness[doubtful] = vertex_openness(vertices, faces, subset=doubtful)
+    openness[doubtful] = vertex_openness(vertices, faces, subset=doubtful, scene=rays)
     return openness
 
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from facewright.data import Scan
+from facewright.mesh.raster import RayScene
 from facewright.register.colors import surface_colors
 from facewright.register.lids import STEP_MM, EyePicture, lid_borders, trace_borders
 
@@ -86,7 +87,7 @@ def test_borders_lie_on_a_scan_that_is_painted_by_vertices():
     flat = np.stack([x.ravel(), y.ravel()], axis=1)
     scan = Scan(np.column_stack([flat, z.ravel()]), faces, colors=painted(flat))
     upper, lower = [np.column_stack([line, np.full(len(line), 8.0)]) for line in landmarks(3.5, 2.5)]
-    borders = lid_borders(scan, surface_colors(scan), upper, lower)
+    borders = lid_borders(RayScene(scan.vertices, scan.faces), surface_colors(scan), upper, lower)
     assert worst([border.points for border in borders]) < 0.8
     for border in borders:
         x, y, z = border.points.T
