@@ -53,7 +53,7 @@ class LipSlit:
         pitch = np.radians(self.options.pitch_deg)
         self._heights = [np.array([0.0, np.cos(pitch), turn * np.sin(pitch)]) for turn in (-1.0, 1.0)]
         self._edges = [unique_edges(patch[shown[patch].all(axis=1)]) for patch in patches]
-        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm, asking=seam)
+        self._spread = SoftSpread(vertices, faces, free, self.options.reach_mm)
         corners = cKDTree(vertices[seams[0][[0, -1]]])
         self._asked = [corners.query(vertices[line[1:-1]])[0] > self.options.corner_mm for line in seams]
         self._at_rest = [np.maximum(gap, 0.0) for gap in self.gaps(vertices)]

@@ -54,25 +54,22 @@ class SoftSpread:
     """Displacements of least bending that follow wishes of some vertices.
 
     Minimises  sum_i w_i |u_i - d_i|^2 + smooth_mm^4 (u^T L M^-1 L u + u^T M u / reach^4), 0 outside free.
-    What a push at one vertex does to all others is solved once; wishes of k vertices then cost a dense system of k.
+    What a push at one vertex does to all others is solved once, when it first wishes for something; wishes of k
+    vertices then cost a dense system of k.
     V (n, 3), F (m, 3), free (n,) bool; reach_mm: the field fades over this distance
-    asking  indices of the vertices that may wish for something; default: all that are free
     ties    (one (k,), other (k,), strength (k,)): vertices that shall move alike; adds strength |u_one - u_other|^2
     """
 
-    def __init__(self, V, F, free, reach_mm=5.0, asking=None, ties=None):
+    def __init__(self, V, F, free, reach_mm=5.0, ties=None):
         self._free, self._n = np.flatnonzero(free), len(V)
-        asking = self._free if asking is None else np.intersect1d(asking, self._free)
-        self._row = np.full(self._n, -1)
-        self._row[asking] = np.arange(len(asking))
-        self._column = np.searchsorted(self._free, asking)
-        pushes = np.zeros((len(self._free), len(asking)))
-        pushes[self._column, np.arange(len(asking))] = 1.0
+        self._place = np.full(self._n, -1)  # of a vertex among those that are free
+        self._place[self._free] = np.arange(len(self._free))
         energy = _bending(V, F, reach_mm)
         if ties is not None:
             energy = energy + _tied(*ties, self._n)
         energy = energy[self._free][:, self._free]
-        self._response = np.ascontiguousarray(Factorization(energy).solve(pushes).T)
+        self._factor = Factorization(energy)
+        self._row, self._responses = np.full(self._n, -1), np.zeros((0, len(self._free)))
 
     def __call__(self, wishes, weights, smooth_mm=1.0):
         """(n, 3) field for wishes (n, 3) with weights (n,); a vertex of weight 0 wishes for nothing.
@@ -80,16 +77,25 @@ class SoftSpread:
         smooth_mm  width over which one vertex with w = 1 mm^2 is felt
         """
         field = np.zeros((self._n, 3))
-        who = np.flatnonzero((weights > 0) & (self._row >= 0))
+        who = np.flatnonzero((weights > 0) & (self._place >= 0))
         if not len(who):
             return field
-        rows = self._row[who]
-        response = self._response[rows]
-        system = response[:, self._column[rows]]
+        response = self._response(who)
+        system = response[:, self._place[who]]
         system[np.diag_indices(len(who))] += smooth_mm**4 / weights[who]
         factor = cho_factor(system, check_finite=False)
         field[self._free] = response.T @ cho_solve(factor, wishes[who], check_finite=False)
         return field
+
+    def _response(self, who):
+        """(k, f) what pushes at vertices who (k,) do to all that are free."""
+        new = who[self._row[who] < 0]
+        if len(new):
+            pushes = np.zeros((len(self._free), len(new)))
+            pushes[self._place[new], np.arange(len(new))] = 1.0
+            self._row[new] = len(self._responses) + np.arange(len(new))
+            self._responses = np.concatenate([self._responses, self._factor.solve(pushes).T])
+        return self._responses[self._row[who]]
 
 
 def _bending(V, F, reach_mm):
