@@ -2,7 +2,7 @@
 
 Not in a thread: those of one Python share a lock that most of the work here holds, so that two took as long as one. And
 not in a pool of processes: one that was tried stayed for ever where the first process was killed. This one reads its
-work from a pipe, and ends with it.
+work from a pipe, and ends with it, after what it is at.
 """
 
 from __future__ import annotations
@@ -14,11 +14,14 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
 from facewright.memory import peak_memory_mb
 
+# Its path is this process's, or a file in the folder that the user works in could stand for a module.
+_START = "import sys; sys.path[:] = sys.argv[1:]; from facewright.beside import _main; _main()"
 _GONE = OSError, EOFError, pickle.UnpicklingError  # what talking to a process that has ended comes to
 
 
@@ -32,8 +35,9 @@ class Beside:
 
     def __init__(self, jobs=1):
         self.peak_mb, self._process, self._ended = 0.0, None, False
-        # A Python within another program may not know its own.
-        self._talking = ThreadPoolExecutor(1) if jobs > 1 and sys.executable else None
+        # Within another program there may be none to start, or the program itself would be started again.
+        able = "python" in Path(sys.executable or "").name.lower() and not getattr(sys, "frozen", False)
+        self._talking = ThreadPoolExecutor(1) if jobs > 1 and able else None
 
     def __enter__(self):
         return self
@@ -57,9 +61,8 @@ class Beside:
     def _answer(self, work, arguments):
         """What _serve answers, once it does."""
         if self._process is None:
-            environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-            command, pipe = [sys.executable, "-m", "facewright.beside"], subprocess.PIPE
-            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment)
+            command, pipe = [sys.executable, "-c", _START, *filter(None, sys.path)], subprocess.PIPE
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe)
         if self._ended:  # meanwhile
             self._process.kill()
         pickle.dump((work, arguments), self._process.stdin, pickle.HIGHEST_PROTOCOL)
@@ -90,12 +93,14 @@ class _Begun:
 
 def _serve(source, sink):
     """Do what comes from the file source, and write into sink (result, exception or None, peak_memory_mb())."""
-    with threadpool_limits(1, user_api="blas"), suppress(*_GONE):
+    with suppress(*_GONE):
         while True:
             work, arguments = pickle.load(source)
             result = failure = None
             try:
-                result = work(*arguments)
+                # As in the first process; only what is loaded by now can be limited.
+                with threadpool_limits(1, user_api="blas"):
+                    result = work(*arguments)
             except Exception as error:
                 failure = error
             pickle.dump((result, failure, peak_memory_mb()), sink, pickle.HIGHEST_PROTOCOL)
@@ -109,7 +114,3 @@ def _main():
     sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     _serve(sys.stdin.buffer, sink)
-
-
-if __name__ == "__main__":
-    _main()

@@ -11,6 +11,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
+_HELD = PermissionError if sys.platform == "win32" else BlockingIOError
 FAR = 1 << 20  # Windows forbids to read what is locked: a byte past the end leaves the process id readable
 
 
@@ -45,7 +46,7 @@ def _lock(descriptor):
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         else:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError):
+    except _HELD:
         os.lseek(descriptor, 0, os.SEEK_SET)
         raise Locked(os.read(descriptor, 20).decode() or "unknown") from None
     except OSError:

@@ -67,8 +67,8 @@ class OutputFolder:
         ours = (self.folder / "rig" / "rig.json").is_file() or any(self.stages.glob("*/stage.json"))
         if taken and not ours:
             raise InputError(
-                f"output folder {self.folder}: its {taken[0]} is from no earlier run and would be overwritten; "
-                "choose another --out"
+                f"output folder {self.folder}: its {taken[0]} cannot be told to be from an earlier run and would be "
+                "overwritten; choose another --out"
             )
 
     @contextmanager

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from facewright.beside import Beside
 from facewright.errors import InputError
@@ -32,6 +33,22 @@ def test_what_goes_wrong_is_told_as_it_was(jobs, tmp_path):
         assert beside.begin(np.sum, np.ones(3)).result() == 3.0
 
 
+def test_it_takes_modules_from_where_the_first_process_does(tmp_path, monkeypatch):
+    (tmp_path / "threadpoolctl.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path)
+    with Beside(2) as beside:
+        assert beside.begin(os.getpid).result() != os.getpid()
+
+
+def test_its_matrices_keep_to_one_thread_and_its_memory_is_its_own():
+    held = np.ones(60_000_000)  # 480 MB, which a process is born with as its peak
+    with Beside(2) as beside:
+        beside.begin(np.sum, np.ones(3)).result()
+        libraries = beside.begin(threadpool_info).result()
+    assert {one["num_threads"] for one in libraries if one["user_api"] == "blas"} <= {1}
+    assert held[-1] == 1.0 and beside.peak_mb < 400
+
+
 def test_what_a_library_prints_is_no_answer():
     with Beside(2) as beside:
         assert beside.begin(print, "hello").result() is None
@@ -55,6 +72,7 @@ def test_it_ends_with_what_uses_it_whatever_it_does():
 def test_it_ends_when_the_first_process_is_killed():
     code = (
         "import os, sys; from facewright.beside import Beside; beside = Beside(2); beside.begin(os.getpid).result()\n"
+        "import time; beside.begin(time.sleep, 1); time.sleep(0.2)\n"
         "sys.stdout.close(); os.kill(os.getpid(), 9)"
     )
     # Both write into the pipe of the first one's stderr, which is read to its end: until neither runs.

@@ -3,8 +3,8 @@
 A face that keeps a third of its area in one shape and a half in another may lie upside down where both play, and one
 that turns between two in-betweens half way. Such faces are few. They are asked in a sample of poses that is the same
 for every head: shapes on their way, pairs with a corrective, looks with lids half shut, blends of expressions and
-visemes. Where one folds or nearly does, the shapes at fault are
-changed together with what lies around (contact.opening).
+visemes. Where one folds or nearly does, the shapes at fault are changed together with what lies around
+(contact.opening).
 
 Tried: what is missing of a face shared out pose by pose until none is missing (0.39 mm where the least motion needs
 0.11, other faces folded by it); blends alone as the sample, 1,000 of them (folds stay where a lid half shut meets a

@@ -37,6 +37,8 @@ _KEPT_APART = 0.25  # of their distance, by which two faces stay off a plane hal
 _ROUNDS, _WORST = 10, 12  # of solving; poses that are asked more of a face in each
 _PATIENCE, _PATIENCE_OPEN = 4, 2  # rounds without gain, and once no face is folded
 _STILL_MM = 1e-4
+# What gives way no more readily than this, as margins of lids do, moves no farther, or is made that much stiffer.
+_STIFF_EASE, _STIFF_MM, _STIFFER = 0.1, 0.12, 0.4
 
 
 class Faces:
@@ -216,6 +218,7 @@ class _Opening:
         self.patch, self.around = patch, around
         ease = (np.abs(patch.deltas).max(axis=2) > _STILL_MM) * ease
         self.root = np.sqrt(ease)[:, :, None]
+        self.stiff = ease.max(axis=0) < _STIFF_EASE
         along, turn, _ = patch.look(weights)
         near = (along < _NEAR[0] * patch.area) | (turn < _NEAR[1])
         poses, self.faces = near.any(axis=1), near.any(axis=0)
@@ -228,6 +231,10 @@ class _Opening:
         best = change = motion = np.zeros_like(self.patch.deltas)
         pairs, fewest, last, idle = np.zeros((0, 2), np.int64), None, None, 0
         for rounds_left in reversed(range(_ROUNDS)):
+            if self._strays(change):
+                # A gap between shut lids is seen, a face that stays folded at their corners is not.
+                self.root[:, self.stiff] *= _STIFFER
+                change = motion = np.zeros_like(change)
             lack, faults = self._lack(change)
             better = fewest is None or faults < fewest
             unsound = better and change.any() and self.around.unsound(change)
@@ -245,6 +252,10 @@ class _Opening:
                 motion = 0.5 * (motion + before)  # or it swings to and fro
             change, last = self.root * motion, faults
         return best
+
+    def _strays(self, change):
+        """Whether a change moves what is stiff too far in some pose."""
+        return lengths(np.tensordot(self.weights, change[:, self.stiff], 1)).max(initial=0.0) > _STIFF_MM
 
     def _lack(self, change):
         """(p, k) what is missing of faces under a change, and the numbers of faces that are folded and that lack."""
