@@ -13,9 +13,8 @@ def peak_memory_mb():
         import resource
     except ImportError:  # Windows
         return _peak_memory_windows_mb()
-    with suppress(
-        OSError, IndexError, ValueError
-    ):  # on Linux the figure below is inherited from who started the process
+    # On Linux the figure of getrusage is inherited from who started the process.
+    with suppress(OSError, IndexError, ValueError):
         return round(int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) / 1024.0, 1)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(peak / (1024.0 if sys.platform != "darwin" else 1024.0**2), 1)

@@ -75,7 +75,7 @@ def preview_sheet(rig, scan, face, title=None, closer=None):
 
 
 def draw_close_ups(rig):
-    """The close-ups of a preview, a third of its work, for who wants to draw them beside the rest."""
+    """The close-ups of a preview, half of its work, for who wants to draw them beside the rest."""
     return close_up_sections(rig, Puppet(rig))
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from facewright.contact import opening
 from facewright.contact.opening import Faces, Surroundings, _between
 from facewright.mesh.folds import folded_by_shape
 from facewright.mesh.intersect import self_intersections
@@ -58,6 +59,20 @@ def test_faces_are_opened_beside_a_sheet_that_nothing_may_cross(sheets):
     after = vertices + deltas[0]
     after[patch.used] += change[0]
     assert not len(folded_by_shape(vertices, after, faces)) and not len(self_intersections(after, faces))
+
+
+@pytest.mark.parametrize("limit, stays", [(0.12, True), (np.inf, False)])
+def test_what_is_stiff_stays_where_it_is(sheets, monkeypatch, limit, stays):
+    vertices, faces, middle = sheets
+    deltas = np.zeros((1, len(vertices), 3))
+    deltas[0, middle] = [PULL, 0.0, 0.0]
+    patch = patch_of(vertices, faces, middle, deltas)
+    ease = np.where(patch.used == middle, 0.03, 0.0)
+    around = Surroundings(patch, ease > 0.0, vertices, faces, list(deltas), np.ones((1, 1)))
+    monkeypatch.setattr(opening, "_STIFF_MM", limit)
+    weights = np.linspace(0.1, 1.0, 10)[:, None]
+    change = patch.opened(weights, np.ones(len(patch.asked), bool), ease, around)
+    assert (np.linalg.norm(change, axis=2).max() <= 0.12) == stays
 
 
 def test_a_plane_lies_between_triangles_that_are_apart():
