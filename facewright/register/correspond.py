@@ -96,18 +96,20 @@ class Target:
         self.vertices, self.faces = self.surface.vertices, self.surface.faces
         self.normals = vertex_normals(self.vertices, self.faces)
         self.border = border_vertices(self.faces, len(self.vertices))
-        self.roughness, self.hair = np.ones(len(self.vertices)), np.zeros(len(self.vertices))
+        self.roughness = np.ones(len(self.vertices))
+        self.hair, self.off_skin = np.zeros((2, len(self.vertices)))
         self.openness = np.ones(len(self.vertices)) if openness is None else np.asarray(openness)
 
     def tell_skin(self, skin_points, hair):
-        """Set self.roughness (n,) relative to the scan's skin, known to lie near skin_points (k, 3), and self.hair.
+        """Set self.roughness (n,) relative to the scan's skin, known to lie near skin_points (k, 3), and its colours'.
 
-        hair (n,) 0..1: how surely its colour is hair's, however smoothly that is combed
+        hair: hair.HairColor, which becomes self.hair (dark) and self.off_skin
         """
         degrees = roughness_deg(self.vertices, self.faces)
         skin = self.surface.closest(skin_points)
         typical = np.median(interpolate(degrees, self.faces, skin.faces, skin.barycentric))
-        self.roughness, self.hair = degrees / max(float(typical), 3.0), np.asarray(hair)
+        self.roughness = degrees / max(float(typical), 3.0)
+        self.hair, self.off_skin = hair
 
     def smoothed(self, edge_mm):
         """The same Target without the scanner's noise: what is finer than about PASS_MM is gone, the rest stays.
@@ -120,7 +122,7 @@ class Target:
         pass_mm = max(PASS_MM, FACET_PASS * edge_mm)
         while edge_mm > FINE_MM:
             edges, smooth.faces = split_in_four(smooth.faces, len(smooth.vertices))
-            for name in ("vertices", "roughness", "hair", "openness"):
+            for name in ("vertices", "roughness", "hair", "off_skin", "openness"):
                 setattr(smooth, name, with_midpoints(getattr(smooth, name), edges))
             edge_mm /= 2
         smooth.surface = Surface(_low_pass(smooth.vertices, smooth.faces, edge_mm, pass_mm), smooth.faces)
@@ -149,11 +151,8 @@ class Target:
         weights *= np.clip(openness / self.MIN_OPENNESS - 1.0, 0.0, 1.0) if self.openness.min() < 1 else 1.0
         if tau is not None:
             weights *= (tau**2 / (tau**2 + nearest.distance**2)) ** 2
-        roughness, hair = (
-            interpolate(values, self.faces, nearest.faces, nearest.barycentric)
-            for values in (self.roughness, self.hair)
-        )
-        return Matches(nearest.points, scan_normals, weights, nearest.distance, roughness, hair)
+        told = self._told(self.faces, nearest.faces, nearest.barycentric)
+        return Matches(nearest.points, scan_normals, weights, nearest.distance, *told)
 
     def samples(self, count, seed=0):
         """Samples spread evenly over the open part of the scan."""
@@ -170,5 +169,8 @@ class Target:
         at = self.faces, face, barycentric
         normals = interpolate(self.normals, *at)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        points, roughness, hair = (interpolate(values, *at) for values in (self.vertices, self.roughness, self.hair))
-        return Samples(points, normals, roughness, hair)
+        return Samples(interpolate(self.vertices, *at), normals, *self._told(*at))
+
+    def _told(self, *at):
+        """(roughness, hair), each (k,), at places of interpolate."""
+        return tuple(interpolate(values, *at) for values in (self.roughness, self.hair))

@@ -56,7 +56,8 @@ class EarOptions:
     left_mm: float = 2.5
     hold: float = 0.15
     better: float = 0.85
-    shown_mm: float = 4.5
+    shown_mm: float = 3.5
+    own_mm: float = 5.0
 
 
 class _Pairs(NamedTuple):
@@ -75,9 +76,12 @@ def ear_motion(vertices, faces, ears, target, options=None):
     """
     options = options or EarOptions()
     result = np.zeros_like(vertices)
-    for mask in ears:
-        ear = _Ear(vertices, faces, np.flatnonzero(mask), target, options) if mask.any() else None
-        place = ear.fitted() if ear else None
+    ears = [_Ear(vertices, faces, np.flatnonzero(mask), target, options) for mask in ears if mask.any()]
+    alone = [ear.fitted() for ear in ears]
+    mirrored = [_mirrored(place) for place in alone if place is not None]
+    for ear, place in zip(ears, alone):
+        # Two ears are much alike: where one was found tells where to look for the other.
+        place = place or (ear.fitted(*mirrored) if mirrored else None)
         if place is not None:
             A, t = place
             led = ear.index[ear.height > options.out_mm[0]]
@@ -90,18 +94,29 @@ def ear_motion(vertices, faces, ears, target, options=None):
 def hidden_ears(vertices, faces, ears, target, options=None):
     """(n,) bool: ears that the scan does not show. Under hair a model that gives way would shrink them into it.
 
-    As for ear_motion. Mean distance from the scan, what meets nothing counting as 14 mm, of seven scans on one or both
-    templates: 1.2 to 4.4 mm where the model has the ear of the scan, after ear_motion 1.2 to 3.0 where it had not;
-    5.9 to 10.6 under hair.
+    As for ear_motion. Mean distance of the outer side from the scan, what meets nothing counting as 14 mm, of the
+    sample, three real scans and 20 heads of known truth: 0.2 to 2.7 mm where the model has the ear of the scan, after
+    ear_motion 1.1 to 3.3 where it had not (5.6 to 8.6 before); 5.4 to 7.9 under hair.
     """
     options = options or EarOptions()
     hidden = np.zeros(len(vertices), bool)
     normals = vertex_normals(vertices, faces)
     for mask in ears:
         match = _matched(vertices[mask], normals[mask], target, options)
-        if _far_if_unmet(match, options).mean() >= options.shown_mm:
+        if _far_if_unmet(match, options)[_outer(vertices[mask], normals[mask])].mean() >= options.shown_mm:
             hidden |= mask
     return hidden
+
+
+def _mirrored(place):
+    """The place (A, t) of one ear for the other."""
+    (A, t), mirror = place, np.diag([-1.0, 1.0, 1.0])
+    return mirror @ A @ mirror, mirror @ t
+
+
+def _outer(vertices, normals):
+    """(k,) bool: vertices (k, 3) of an ear that look away from the head. Behind an ear a scanner may see nothing."""
+    return normals[:, 0] * np.sign(vertices[:, 0].mean()) > 0.0
 
 
 def _matched(points, normals, target, options):
@@ -135,23 +150,28 @@ class _Ear:
         low, high = options.out_mm
         heights = self.height, _height(target.vertices[self.near], head)
         self.own, self.there = (a * np.clip((h - low) / (high - low), 0.0, 1.0) for a, h in zip(area, heights))
-        self.there *= np.clip(1.0 - target.hair[self.near], 0.0, 1.0)
+        self.there *= 1.0 - target.off_skin[self.near]
+        self.outer = _outer(self.vertices, self.normals)
+        self.own *= self.outer
 
-    def fitted(self):
-        """(A (3, 3), t (3,)) of the ear; None where the scan shows no such ear, or where the ear fits as it is."""
+    def fitted(self, *starts):
+        """(A (3, 3), t (3,)) of the ear; None where the scan shows no such ear, or where the ear fits as it is.
+
+        starts: places to try besides where the ear is, instead of those that the scan's outline tells
+        """
         if not self.own.any() or not self.there.any():
             return None
         options, stays = self.options, (np.eye(3), np.zeros(3))
         if self._distance(stays) < options.fits_mm:
             return None
-        best = self._best_from(stays, self._by_outline())
-        if self._own_distance(best) > options.left_mm:
+        best = self._best_from(stays, *(starts or [self._by_outline()]))
+        if not starts and self._own_distance(best) > options.left_mm:
             # Hair around an ear has an outline too, and folds of an ear 10 mm off are met by the wrong folds.
             best = self._best_from(best, *self._aside())
         best = self._settled(best, partial(best_affine, like=best[0], hold=options.hold))
-        shown = _far_if_unmet(self._matched(best)[2], options).mean() < options.shown_mm
+        shown = _far_if_unmet(self._matched(best)[2], options)[self.outer].mean() < options.shown_mm
         # A small ear in hair is met by it all over, but what stands out of the head is far from what stands out there.
-        nearer = self._own_distance(best) < min(self._own_distance(stays), options.shown_mm)
+        nearer = self._own_distance(best) < min(self._own_distance(stays), options.own_mm)
         return best if shown and nearer and self._both_ways(best) < options.better * self._both_ways(stays) else None
 
     def _best_from(self, *starts):

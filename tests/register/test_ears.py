@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from facewright.mesh.normals import vertex_normals
 from facewright.register.correspond import Target
 from facewright.register.ears import EarOptions, _without_ear, ear_motion, hidden_ears
 
@@ -27,6 +28,18 @@ def with_other_ears(V, ears, scale, shift):
     return moved
 
 
+def with_tufts(V, F, ears, ball_scan):
+    """The Target of a skin with a tuft as large as an ear, standing out beside it, and how many it has itself."""
+    tufts, faces = V.copy(), [F]
+    for ear in ears:
+        tuft, sign = ball_scan(None, k=12, radius=18.0), np.sign(V[ear, 0].mean())
+        faces.append(tuft.faces + len(tufts))
+        tufts = np.concatenate(
+            [tufts, tuft.vertices * [0.5, 1.4, 1.0] + V[ear].mean(axis=0) + [sign * 4.0, 24.0, -14.0]]
+        )
+    return Target(tufts, np.concatenate(faces)), len(V)
+
+
 @pytest.mark.parametrize(
     "scale, shift",
     [(1.3, (0.0, 3.0, -2.0)), (0.8, (0.0, -2.0, 0.0)), (1.0, (0.0, 7.0, -5.0)), (1.0, (0.0, -12.0, 8.0))],
@@ -35,6 +48,28 @@ def test_other_ears_are_found(head, scale, shift):
     V, F, ears = head
     scan = with_other_ears(V, ears, scale, shift)
     moved = V + ear_motion(V, F, ears, Target(scan, F))
+    for ear in ears:
+        before, after = (np.linalg.norm((x - scan)[ear], axis=1).mean() for x in (V, moved))
+        assert after < 0.4 * before
+
+
+def test_ears_are_found_whose_backs_no_scanner_saw(head):
+    V, F, ears = head
+    scan = with_other_ears(V, ears, 1.0, (0.0, 12.0, -9.0))
+    normals = vertex_normals(scan, F)
+    unseen = np.any(ears, axis=0) & (normals[:, 0] * np.sign(V[:, 0]) < 0.0)
+    moved = V + ear_motion(V, F, ears, Target(scan, F[~unseen[F].any(axis=1)]))
+    for ear in ears:
+        before, after = (np.linalg.norm((x - scan)[ear], axis=1).mean() for x in (V, moved))
+        assert after < 0.4 * before
+
+
+def test_an_ear_beside_hair_of_another_hue_is_found(head, ball_scan):
+    V, F, ears = head
+    scan = with_other_ears(V, ears, 1.0, (0.0, 12.0, -9.0))
+    target, n = with_tufts(scan, F, ears, ball_scan)
+    target.off_skin[n:] = 1.0
+    moved = V + ear_motion(V, F, ears, target)
     for ear in ears:
         before, after = (np.linalg.norm((x - scan)[ear], axis=1).mean() for x in (V, moved))
         assert after < 0.4 * before
@@ -70,14 +105,6 @@ def test_ears_that_fit_and_ears_that_are_hidden_stay(head):
 
 
 def test_hair_beside_an_ear_that_fits_does_not_lead_it_away(head, ball_scan):
-    """A tuft as large as an ear, standing out beside it."""
     V, F, ears = head
-    tufts, faces = V.copy(), [F]
-    for ear, sign in zip(ears, (1.0, -1.0)):
-        tuft = ball_scan(None, k=12, radius=18.0)
-        faces.append(tuft.faces + len(tufts))
-        tufts = np.concatenate(
-            [tufts, tuft.vertices * [0.5, 1.4, 1.0] + V[ear].mean(axis=0) + [sign * 4.0, 24.0, -14.0]]
-        )
-    target = Target(tufts, np.concatenate(faces))
+    target, _ = with_tufts(V, F, ears, ball_scan)
     assert not ear_motion(V, F, ears, target).any()
