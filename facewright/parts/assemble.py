@@ -18,7 +18,8 @@ from facewright.working_set import read_working_set
 
 _STILL_MM = 1e-6
 SKIN_MAPS = ("albedo", "normal")
-_DIMMED, _LEAST_LIGHT = 0.25, 0.6  # power of the light that a scan's eyes lack, and least share, that the rig's lack
+# Powers of the light that irises and whites of a scan lack, and least share, that the rig's have.
+_DIMMED, _WHITES_DIMMED, _LEAST_LIGHT = 0.25, 0.5, 0.6
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def build_rig(face, deltas, maps=None, options=None, eyes=None):
     options = options or AssemblyOptions()
     seen = face.stats.get("parts", {})
     if options.eyes is not None and options.eyes.iris_color is None and "iris_color" in seen:
-        options = replace(options, eyes=_as_seen(options.eyes, seen["iris_color"], seen.get("eye_light", 1.0)))
+        options = replace(options, eyes=_as_seen(options.eyes, seen))
     maps = maps or {}
     template = face.template
     words = read_working_set()
@@ -133,12 +134,19 @@ def _weights(template, part):
     return weights
 
 
-def _as_seen(look, iris_color, light):
-    """The EyeLook of a scan's irises. Where a photograph has the eyes in the shade, so it has all of the face: eyes in
-    full light would glow in it, so they get a little less."""
-    dimmed = max(light**_DIMMED, _LEAST_LIGHT)
-    color, white = (tuple(dimmed * np.asarray(part)) for part in (iris_color, look.sclera_color))
-    return replace(look, iris_color=color, sclera_color=white)
+def _as_seen(look, seen):
+    """The EyeLook of a scan's eyes, from what parts.fit says of them. Where a photograph is dim or has the eyes in the
+    shade, so it has all of the face: whites in full light would glow in it, so they, and irises in the shade, get less.
+    """
+    irises, whites = (
+        max(share**power, _LEAST_LIGHT)
+        for share, power in ((seen.get("eye_light", 1.0), _DIMMED), (seen.get("eye_white", 1.0), _WHITES_DIMMED))
+    )
+    return replace(
+        look,
+        iris_color=tuple(irises * np.asarray(seen["iris_color"])),
+        sclera_color=tuple(whites * np.asarray(look.sclera_color)),
+    )
 
 
 def _material(template, part, maps, options, light):

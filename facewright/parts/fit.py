@@ -64,6 +64,7 @@ def fit_parts(face, options=None, irises=None):
     if irises:
         stats["iris_color"] = np.mean([iris.lit_color for iris in irises.values()], axis=0).tolist()
         stats["eye_light"] = float(np.mean([iris.light for iris in irises.values()]))
+        stats["eye_white"] = float(np.mean([iris.whiteness for iris in irises.values()]))
     mouth = [part for part in template.parts if part.attach in ("skull", "jaw")]
     if mouth:
         V, stats["mouth"] = _fit_mouth(template, V, face.lines, mouth, options)

@@ -45,9 +45,14 @@ class Iris:
     white: np.ndarray
 
     @property
+    def whiteness(self):
+        """Share in 0..1 of the light of a white in full light."""
+        return float(min(1.0, self.white @ LUMINANCE / np.dot(WHITE, LUMINANCE)))
+
+    @property
     def light(self):
         """Share in 0..1 of the light that an eye in the open has: 1 for a white as bright as can be told from one."""
-        return float(min(1.0, self.white @ LUMINANCE / (_LIT * np.dot(WHITE, LUMINANCE))))
+        return min(1.0, self.whiteness / _LIT)
 
     @property
     def lit_color(self):

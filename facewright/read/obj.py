@@ -12,7 +12,15 @@ import warnings
 import numpy as np
 
 from facewright.errors import InputError
-from facewright.read.raw import ImageSource, RawMaterial, RawMesh, colors_to_unit, path_beside, triangulate
+from facewright.read.raw import (
+    ImageSource,
+    RawMaterial,
+    RawMesh,
+    colors_to_unit,
+    images_beside,
+    path_beside,
+    triangulate,
+)
 
 # Faces parsed at a time: bounds the memory that the byte-wise look at their text takes.
 FACES_PER_BLOCK = 200_000
@@ -189,7 +197,10 @@ def _read_library(path, name):
     try:
         file = path_beside(path, name)
     except InputError:
-        return {}, f"the material library {name!r} of {path.name} is missing; read without its textures"
+        return {}, (
+            f"the material library {name!r} of {path.name} is missing; read without its textures, "
+            f"which --albedo gives{images_beside(path)}"
+        )
     materials, current = {}, ""
     for line in file.read_bytes().decode("utf-8", "replace").splitlines():
         words = line.split(None, 1)

@@ -9,6 +9,9 @@ import numpy as np
 
 from facewright.errors import InputError
 
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".tga", ".webp")
+MOST_NAMED = 3  # images in a message
+
 
 @dataclass(frozen=True)
 class ImageSource:
@@ -73,7 +76,14 @@ def path_beside(path, name):
         )
     raise InputError(
         f"{path.name}: names {name!r}, which does not exist; put it there or give the texture with --albedo"
+        f"{images_beside(path)}"
     )
+
+
+def images_beside(path):
+    """The images in a mesh file's folder as " (a.png, b.jpg)", to be named by a user; "" for none or too many."""
+    images = sorted(file.name for file in path.parent.iterdir() if file.suffix.lower() in IMAGE_SUFFIXES)
+    return f" ({', '.join(images)})" if 0 < len(images) <= MOST_NAMED else ""
 
 
 def triangulate(counts):

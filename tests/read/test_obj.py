@@ -95,8 +95,10 @@ def test_only_material_is_for_all(tmp_path):
 
 
 def test_missing_library_is_noted(tmp_path):
+    (tmp_path / "skin.png").write_bytes(b"")
     scan = read_scan(written(tmp_path, "mtllib gone.mtl\nusemtl a\n" + SQUARE + "f 1/1 2/2 3/3\n"))
     assert scan.textures == () and "gone.mtl" in scan.notes[0]
+    assert "--albedo gives (skin.png)" in scan.notes[0]
 
 
 @pytest.mark.parametrize(
