@@ -31,9 +31,9 @@ LEAST_PIXELS = 100
 # Levels of brightness and of two differences of colour; a colour this rare was not seen; log odds that say nothing, and
 # the most they say.
 LEVELS, RARE, EVEN, SURE = 24, 2e-5, 1.5, 3.0
-# The colours of an eye that the landmarks draw too narrow are counted as skin's until the first rounds have widened it:
-# a real one whose upper lid they had 3.5 mm too low was still 2 mm too narrow after two rounds, 0.6 after four. On heads
-# of known truth (0.36 mm off) and menpo-james both come to the same, as do a wider and a narrower search.
+# The colours of an eye that the landmarks draw too narrow are counted as skin's until the first rounds have widened
+# it: a real one whose upper lid they had 3.5 mm too low was still 2 mm too narrow after two rounds, 0.6 after four. On
+# heads of known truth (0.36 mm off) and menpo-james both come to the same.
 ROUNDS = 4
 SEARCH = CreaseOptions(step_mm=STEP_MM, half_band_mm=5.0, prior_sigma_mm=2.5, bend_weight=0.6)
 # A path that gains less by so much than the best one of its column counts as nothing (log odds times mm).
