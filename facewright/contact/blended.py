@@ -45,17 +45,16 @@ def lay_blends_flat(face, targets):
     touched[skin.faces[risk]] = True
     touched = dilate(touched, skin.faces)
     ease = skin.ease * touched
-    patches = [skin.faces_of(patch) for patch in skin.patches(np.flatnonzero(touching(touched, skin.faces)))]
+    patches = skin.patches(np.flatnonzero(touching(touched, skin.faces)))
     plain = skin.weights(plain_poses(targets))
-
-    def opened(patch):
+    for asked in patches:
+        # One after the other: both margins of a lid may change, each soundly as long as the other stays.
+        patch = skin.faces_of(asked)
         own = ease[patch.used]
         around = Surroundings(patch, own > 0.0, skin.V, skin.all_faces, skin.deltas, plain)
-        return patch.opened(weights, risk[patch.asked], own, around)
-
-    changes = [(patch, opened(patch)) for patch in patches]
-    result = skin.changed(changes)
-    return result.evened(face.template.mirror) if changes and is_even(face) else result
+        skin.change(patch, patch.opened(weights, risk[asked], own, around))
+    result = skin.changed()
+    return result.evened(face.template.mirror) if patches and is_even(face) else result
 
 
 class _Skin:
@@ -70,6 +69,7 @@ class _Skin:
         self.faces = even_handed(self.all_faces[~inner[self.all_faces].any(axis=1)], face.template.mirror)[0]
         self.names = [*targets.names, *targets.extras]
         self.deltas = [targets.delta(name)[self.at] for name in self.names]
+        self.changes = set()  # of these by change: their indices
         self.ease = np.ones(len(self.V))
         for name, line in face.lines.items():
             if name.startswith("lip_seam"):
@@ -132,17 +132,21 @@ class _Skin:
         faces = np.searchsorted(used, self.faces[asked])
         return Faces(asked, used, played, self.V[used], deltas[played], faces, local.reshape(-1, 3))
 
-    def changed(self, changes):
-        """The Targets with changes [(Faces, (t, n, 3) of the deltas of its vertices)]."""
-        targets = self.targets
-        deltas, extras = np.array(targets.deltas), dict(targets.extras)
-        for patch, change in changes:
-            for i, own in zip(patch.played, change):
-                if not own.any():
-                    continue
-                name = self.names[i]
-                if i >= len(deltas) and extras[name] is targets.extras[name]:
-                    extras[name] = np.array(extras[name])
-                whole = deltas[i] if i < len(deltas) else extras[name]
-                whole[self.at][patch.used] += own
-        return replace(targets, deltas=deltas, extras=extras)
+    def change(self, patch, change):
+        """Add changes (t, n, 3) of the deltas of a Faces' vertices."""
+        for i, own in zip(patch.played, change):
+            if own.any():
+                self.deltas[i] = np.array(self.deltas[i])
+                self.deltas[i][patch.used] += own
+                self.changes.add(i)
+
+    def changed(self):
+        """The Targets with all changes."""
+        deltas, extras = np.array(self.targets.deltas), dict(self.targets.extras)
+        for i in self.changes:
+            name = self.names[i]
+            if i >= len(deltas):
+                extras[name] = np.array(extras[name])
+            whole = deltas[i] if i < len(deltas) else extras[name]
+            whole[self.at] = self.deltas[i]
+        return replace(self.targets, deltas=deltas, extras=extras)

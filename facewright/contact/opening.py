@@ -14,6 +14,7 @@ on its way where 0.1 to 0.3 do together, and folds left); where a face should lo
 from __future__ import annotations
 
 from copy import copy
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +26,8 @@ from facewright.mesh.intersect import intersections_of
 from facewright.mesh.normals import cross, dot, face_corners, face_cross, lengths, normalized
 from facewright.solve.least_motion import least_motion
 
-_AROUND_MM = 8.0  # from a face that is opened: what it may come to cross
+_AROUND_MM, _FAR_MM, _MEETS_MM = 8.0, 25.0, 2.0  # from faces that are opened: what they may come to cross, from rest on
+# and, of what is no farther at rest, in a pose: lids of wide eyes meet from afar
 _SOUND = 0.5, 0.9  # share of its area, and cosine with where it should look, from which on a face is surely open
 _AT_RISK, _AT_RISK_TURN = 0.15, 0.35  # share of its area, and cosine, of a face that may come to fold
 _NEAR = 0.3, 0.6  # the same of one in a pose that is asked again while shapes change
@@ -140,36 +142,35 @@ class Surroundings:
     """What lies around Faces that change, in poses of all targets' weights (p, s): what they may come to cross.
 
     free (n,) bool: vertices of the patch that may give way; vertices (v, 3) of the whole skin at rest, faces (m, 3),
-    deltas: list of (v, 3) of all targets
+    deltas: list of (v, 3) of all targets. What is near is looked for once something changes
     """
 
     def __init__(self, patch, free, vertices, faces, deltas, weights):
-        near = cKDTree(vertices[patch.used]).query(vertices, distance_upper_bound=_AROUND_MM)[0] < _AROUND_MM
-        used, faces = np.unique(faces[touching(near, faces)], return_inverse=True)
-        self._faces, self._place = np.ascontiguousarray(faces.reshape(-1, 3)), np.searchsorted(used, patch.used)
-        weights = weights[weights[:, patch.played].any(axis=1)]
-        self.weights, self._rest = weights[:, patch.played], vertices[used]
-        deltas = np.array([delta.take(used, axis=0) for delta in deltas])
-        self._poses = self._rest + np.tensordot(weights, deltas, 1)
-        self._own = np.full(len(used), -1)  # place of a vertex in the patch
-        self._own[self._place] = np.arange(len(self._place))
-        self._moving = touching(np.isin(np.arange(len(used)), self._place[free]), self._faces)
+        moving = weights[:, patch.played].any(axis=1)
+        self.weights = weights[moving][:, patch.played]
+        self._near = partial(_Near, patch.used, free, vertices, faces, deltas, weights[moving])
         self._before, self._met = {}, np.zeros((0, 3), np.int64)
+
+    @cached_property
+    def near(self):
+        """The _Near of the patch."""
+        return self._near()
 
     def unsound(self, change):
         """Whether more crosses or folds in some pose as deltas change by (t, n, 3); what crosses is remembered."""
-        result, touched = False, touching(self._own >= 0, self._faces)
+        near, result = self.near, False
+        touched = touching(near.own >= 0, near.faces)
 
         def faults(pose):
-            folded = folded_by_shape(self._rest, pose, self._faces, touched)
-            return intersections_of(pose, self._faces, self._moving), len(folded)
+            folded = folded_by_shape(near.rest, pose, near.faces, touched)
+            return intersections_of(pose, near.faces, near.moving), len(folded)
 
-        for k, (row, before) in enumerate(zip(self.weights, self._poses)):
+        for k, (row, before) in enumerate(zip(self.weights, near.poses)):
             motion = np.tensordot(row, change, 1)
             if not motion.any():
                 continue
             after = before.copy()
-            after[self._place] += motion
+            after[near.place] += motion
             pairs, folds = faults(after)
             if not len(pairs) and not folds:
                 continue
@@ -177,7 +178,7 @@ class Surroundings:
                 self._before[k] = faults(before)
             had, folded = self._before[k]
             result |= len(pairs) + folds > len(had) + folded
-            key = [len(self._faces), 1]
+            key = [len(near.faces), 1]
             fresh = np.insert(pairs[~np.isin(pairs @ key, had @ key)], 0, k, axis=1)
             self._met = np.unique(np.append(self._met, fresh, axis=0), axis=0)
         return result
@@ -185,17 +186,45 @@ class Surroundings:
     def walls(self, root):
         """(q, 3 t n) csr and (q,): of corners of faces that have come to cross, how far they go past a plane between
         the two, as deltas, over root (t, n, 1), grow, and how far they are past it without a change."""
+        if not len(self._met):
+            return sp.csr_matrix((0, 3 * root.size)), np.zeros(0)
         pose, *pair = self._met.T
-        corners = [self._faces[face] for face in pair]
-        points = [self._poses[pose[:, None], of_one] for of_one in corners]
+        corners = [self.near.faces[face] for face in pair]
+        points = [self.near.poses[pose[:, None], of_one] for of_one in corners]
         way, middle, gap = _between(*points)
         sign = np.repeat([-1.0, 1.0], 3)
         past = sign * ((np.concatenate(points, axis=1) @ way[:, :, None])[:, :, 0] - middle[:, None])
         past = (past + _KEPT_APART * gap[:, None])[gap > 0.0].ravel()
         row = np.repeat(np.flatnonzero(gap > 0.0), 6)
-        own = self._own[np.concatenate(corners, axis=1)][gap > 0.0].reshape(-1, 1)
+        own = self.near.own[np.concatenate(corners, axis=1)][gap > 0.0].reshape(-1, 1)
         gradient = np.tile(sign, len(own) // 6)[:, None] * way[row]
         return _as_rows(self.weights[pose[row]], own, gradient[:, None], root), past
+
+
+class _Near:
+    """What lies near the vertices used (n,) of a patch: faces (m, 3) of its own vertices, these at rest (v, 3) and in
+    poses (p, v, 3), place (n,) of the patch's vertices among them, own (v,) the other way round or -1, moving (m,)
+    bool: faces that touch a free one. The rest as for Surroundings; deltas, weights (p, t): of all targets.
+    """
+
+    def __init__(self, used, free, vertices, faces, deltas, weights):
+        def posed(chosen):
+            return vertices[chosen] + np.tensordot(weights, [delta.take(chosen, axis=0) for delta in deltas], 1)
+
+        reach = cKDTree(vertices[used]).query(vertices, distance_upper_bound=_FAR_MM)[0]
+        near, far = reach < _AROUND_MM, np.flatnonzero(np.isfinite(reach))
+        poses, patch = posed(far), np.searchsorted(far, used)
+        low, high = (end(poses[:, patch], axis=1, keepdims=True) for end in (np.min, np.max))
+        beside = ((poses > low - _MEETS_MM) & (poses < high + _MEETS_MM)).all(axis=2) & ~near[far]
+        for pose, asked in zip(poses, beside):
+            met = cKDTree(pose[patch]).query(pose[asked], distance_upper_bound=_MEETS_MM)[0] < _MEETS_MM
+            near[far[asked][met]] = True
+        around, faces = np.unique(faces[touching(near, faces)], return_inverse=True)
+        self.faces, self.place = np.ascontiguousarray(faces.reshape(-1, 3)), np.searchsorted(around, used)
+        self.rest, self.poses = vertices[around], posed(around)
+        self.own = np.full(len(around), -1)
+        self.own[self.place] = np.arange(len(used))
+        self.moving = touching(np.isin(np.arange(len(around)), self.place[free]), self.faces)
 
 
 def _between(one, other):
