@@ -46,6 +46,22 @@ def test_what_a_change_lets_cross_is_noticed_and_walled_off(sheets):
     assert (past + walls @ change.ravel()).max() <= 0.0 and not around.unsound(change)
 
 
+def test_what_lies_far_at_rest_is_noticed_where_a_pose_brings_it_near(sheet):
+    """As lids of wide eyes, which a blink brings together."""
+    vertices, faces = sheet()
+    n, middle, far = len(vertices), 7 * 15 + 7, 15.0
+    vertices = np.concatenate([vertices, vertices + [0.0, 0.0, far]])
+    faces = np.concatenate([faces, faces + n])
+    deltas = np.zeros((1, 2 * n, 3))
+    deltas[0, :n, 2] = far - GAP
+    patch = patch_of(vertices, faces, middle, deltas)
+    free = np.isin(patch.used, faces[patch.asked])
+    around = Surroundings(patch, free, vertices, faces, list(deltas), np.ones((1, 1)))
+    change = np.zeros_like(patch.deltas)
+    change[0, patch.used == middle, 2] = 2.0 * GAP
+    assert around.unsound(change)
+
+
 def test_faces_are_opened_beside_a_sheet_that_nothing_may_cross(sheets):
     vertices, faces, middle = sheets
     deltas = np.zeros((1, len(vertices), 3))
