@@ -29,6 +29,7 @@ _ASIDE_MM = 0.02  # a vertex is asked about this far in front of its own surface
 _MOST_MM = 8.0  # what seems to lie deeper has met the other lip from behind
 _PIN = 100.0  # weight of a push against 1 mm2 of bending
 _NOTHING_MM = 1e-4
+_SLACK_MM = 0.3  # by which a vertex may lie deeper behind the other lip than it can have gone
 _TRUSTED_MM = 1.0  # of a clearance: a lip ends, and farther off a vertex gets behind it without passing through it
 _STEPS = np.linspace(0.2, 1.0, 5)  # of a way on which teeth are looked for
 _LOCAL_MM = (0.8,) * 6  # widths for lips that shall meet
@@ -281,9 +282,12 @@ class LipContact:
     def _lip_wishes(self, skin, watches):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
         normals = vertex_normals(skin, self._about_lips)
-        *both, watches = zip(*(self._behind(skin, normals, side, watch) for side, watch in enumerate(watches)))
+        found = [self._behind(skin, normals, side, watch) for side, watch in enumerate(watches)]
+        *both, places, watches = zip(*found)
         index, corners, share, way = map(np.concatenate, both)
         inside = self._in_flesh(skin, normals, index)
+        aside = np.split(~inside, [len(places[0])])
+        watches = tuple(watch.answered(at[out], 0.0) for watch, at, out in zip(watches, places, aside))
         index, corners, share, way = index[inside], corners[inside], share[inside], way[inside]
         wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
         at = np.concatenate([index[:, None], corners], axis=1).ravel()
@@ -301,24 +305,30 @@ class LipContact:
 
     def _behind(self, skin, normals, side, watch):
         """Vertices (k,) of a lip that lie behind the other one, with the corners (k, 3) of the triangle next to them,
-        their shares of it (k, 3) and the way out (k, 3); and the Watch for the next pose."""
+        their shares of it (k, 3), the way out (k, 3) and their places (k,) in the lip; and the Watch for the next pose.
+
+        The lining of a lip has the other one's skin before it at a corner, behind which it has always been: what lies
+        deeper than it can have gone since it was asked last has not come through.
+        """
         mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
         points, other = skin[mine], skin[self.sides[1 - side]]
         watch = watch.at(points, other)
         due = watch.due()
         if not len(due):
             none = np.zeros((0, 3))
-            return due, none.astype(int), none, none, watch
+            return due, none.astype(int), none, none, due, watch
         found = Surface(skin, patch).closest(points[due])
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
         way, depth = found.points - points[due], found.distance
         behind = dot(way, normal) > 0
-        maybe = behind & (depth > self.options.touch_mm) & (depth < _MOST_MM)
+        through = behind & (depth < watch.reach()[due] + _SLACK_MM)
+        maybe = through & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
-        watch = watch.answered(due, np.where(behind, 0.0, np.minimum(depth, _TRUSTED_MM)))
-        out = way[maybe] + self.options.gap_mm * normal[maybe]
-        return mine[due[maybe]], corners[maybe], found.barycentric[maybe], out, watch
+        gone = np.where(through, -depth, 0.0)
+        watch = watch.answered(due, np.where(behind, gone, np.minimum(depth, _TRUSTED_MM)))
+        out, at = way[maybe] + self.options.gap_mm * normal[maybe], due[maybe]
+        return mine[at], corners[maybe], found.barycentric[maybe], out, at, watch
 
 
 def _winding(vertices, faces, points):

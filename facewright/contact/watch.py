@@ -33,8 +33,12 @@ class Watch:
         """(d,) indices of the points that must be asked, in order."""
         return np.flatnonzero(self._clearance <= 0.0)
 
+    def reach(self):
+        """(k,) mm by which points may have got past the surface since they were asked."""
+        return np.maximum(-self._clearance, 0.0)
+
     def answered(self, index, clearance):
-        """The Watch after points of an index (d,) were found to have a clearance (d,) mm."""
+        """The Watch after points of an index (d,) were found to have a clearance (d,) mm; less than 0: past it."""
         known = np.array(self._clearance)
         known[index] = clearance
         return Watch(self._points, self._surface, known)

@@ -12,7 +12,7 @@ from facewright.evaluate.rows import Row
 from facewright.expand import expand_weights
 from facewright.mesh.adjacency import border_vertices, touching
 from facewright.mesh.closest import Surface, interpolate
-from facewright.mesh.normals import vertex_normals
+from facewright.mesh.normals import lengths, vertex_normals
 from facewright.mesh.seam import seam_sides
 from facewright.mesh.winding import winding_numbers
 
@@ -153,6 +153,8 @@ class _Mouth:
         self.apex = V[np.concatenate(seams)].mean(axis=0) - [0.0, 0.0, APEX_MM]
         self.teeth = [mesh for mesh in rig.meshes if mesh.name.startswith("teeth")]
         self.beyond = rig.regions["outer"] & ~rig.regions["lip_upper"] & ~rig.regions["lip_lower"]
+        self.entered = np.full(len(V), np.inf)  # mm, at rest
+        self.entered = self.depths(V)
 
     def moved(self, line):
         """Largest motion of a line under any target, mm."""
@@ -175,20 +177,29 @@ class _Mouth:
 
     def crossing(self, skin):
         """Depth in mm of the deepest lip vertex of a pose (n, 3) inside the other lip."""
-        normals = vertex_normals(skin, self._about_lips)
-        deepest = 0.0
+        return float(self.depths(skin).max())
+
+    def depths(self, skin):
+        """(n,) depth in mm of the lips' vertices in a pose (n, 3) inside the other lip, 0 for what is not.
+
+        The lining of a lip has the other one's skin before it at a corner, at rest and in any pose. Nothing lies deeper
+        in the other lip than at rest and by as much as the two have moved against each other.
+        """
+        rest, normals = self.skin.vertices, vertex_normals(skin, self._about_lips)
+        result = np.zeros(len(skin))
         for side, patch, rim in zip(self.sides, self.patches[::-1], self.rims[::-1]):
             index = np.flatnonzero(side)
             found = Surface(skin, patch).closest(skin[index])
             normal = interpolate(normals, patch, found.faces, found.barycentric)
-            behind = ((skin[index] - found.points) * normal).sum(axis=1) < 0
-            maybe = behind & (found.distance > 0.5 * CROSSING_BAR_MM) & (found.distance < MOST_MM)
+            way, depth = skin[index] - found.points, found.distance
+            maybe = ((way * normal).sum(axis=1) < 0) & (depth > 0.5 * CROSSING_BAR_MM) & (depth < MOST_MM)
             maybe &= ~(rim[patch[found.faces]] & (found.barycentric > 1e-6)).any(axis=1)
+            before = rest[index] - interpolate(rest, patch, found.faces, found.barycentric)
+            maybe &= depth < self.entered[index] + lengths(way - before) + 0.5 * CROSSING_BAR_MM
             asked = index[maybe]
             turns = winding_numbers(self.with_apex(skin), self.closed, skin[asked] + _OFF_MM * normals[asked])
-            inside = turns > 0.5
-            deepest = max(deepest, found.distance[maybe][inside].max(initial=0.0))
-        return float(deepest)
+            result[asked] = np.where(turns > 0.5, depth[maybe], 0.0)
+        return result
 
     def with_apex(self, skin):
         """(n + 1, 3) the skin and, deep in the head, the point of the cone that closes the mouth's surroundings."""

@@ -7,9 +7,12 @@ import pytest
 
 from facewright.contact import Targets, find_jaw, part_lips, solve_mouth
 from facewright.contact.mouth import MouthOptions, _Mouth
+from facewright.contact.watch import Watch
+from facewright.evaluate.mouth import _Mouth as LipFigures
 from facewright.evaluate.mouth import measure_mouth
 from facewright.evaluate.quality import lip_gaps_mm
 from facewright.evaluate.synthetic import random_identity
+from facewright.mesh.normals import vertex_normals
 from facewright.parts import build_rig, fit_parts
 from facewright.rigging import unscanned_face
 from facewright.transfer import transfer_shapes
@@ -182,3 +185,30 @@ def test_the_inside_of_a_lip_may_lie_in_teeth_on_the_way_but_not_in_the_end(solv
 
     assert push(still, 0.0) > 1.0 and push(still, 5.0) == 0.0
     assert 0.0 < push(back, 5.0) < 0.5 * push(back, 0.0)
+
+
+def test_what_has_always_lain_behind_the_other_lip_has_not_come_through_it(hm08_person):
+    face = part_lips(fit_parts(hm08_person(4)))
+    contact = _Mouth(face, MouthOptions()).contact
+    skin = face.vertices[contact.used]
+    normals = vertex_normals(skin, contact.faces)
+    pushed = skin.copy()
+    pushed[contact.sides[1]] += [0.0, 2.0, 0.0]
+
+    def behind(known):
+        """Number of vertices found in a pose whose lips were known clear of each other in another one."""
+        watches = [Watch(known[mine], known[other]) for mine, other in zip(contact.sides, contact.sides[::-1])]
+        return sum(len(contact._behind(pushed, normals, side, watch)[0]) for side, watch in enumerate(watches))
+
+    assert behind(skin) > 50 and behind(pushed) == 0
+
+
+def test_a_crossing_is_no_deeper_than_lips_have_moved(solved):
+    person, _, targets = solved
+    mouth = LipFigures(rig_of(person, targets))
+    rest = mouth.skin.vertices
+    assert mouth.crossing(rest) < 0.3
+    lower = np.flatnonzero(mouth.sides[1])
+    pushed = rest.copy()
+    pushed[lower] += [0.0, 2.0, 0.0]
+    assert 1.0 < mouth.crossing(pushed) < 2.3
