@@ -282,12 +282,9 @@ class LipContact:
     def _lip_wishes(self, skin, watches):
         """The same for lips in each other: half and half; the other lip answers at the corners of its triangle."""
         normals = vertex_normals(skin, self._about_lips)
-        found = [self._behind(skin, normals, side, watch) for side, watch in enumerate(watches)]
-        *both, places, watches = zip(*found)
+        *both, watches = zip(*(self._behind(skin, normals, side, watch) for side, watch in enumerate(watches)))
         index, corners, share, way = map(np.concatenate, both)
         inside = self._in_flesh(skin, normals, index)
-        aside = np.split(~inside, [len(places[0])])
-        watches = tuple(watch.answered(at[out], 0.0) for watch, at, out in zip(watches, places, aside))
         index, corners, share, way = index[inside], corners[inside], share[inside], way[inside]
         wishes, counts = np.zeros_like(skin), np.zeros(len(skin))
         at = np.concatenate([index[:, None], corners], axis=1).ravel()
@@ -305,30 +302,30 @@ class LipContact:
 
     def _behind(self, skin, normals, side, watch):
         """Vertices (k,) of a lip that lie behind the other one, with the corners (k, 3) of the triangle next to them,
-        their shares of it (k, 3), the way out (k, 3) and their places (k,) in the lip; and the Watch for the next pose.
+        their shares of it (k, 3) and the way out (k, 3); and the Watch for the next pose.
 
-        The lining of a lip has the other one's skin before it at a corner, behind which it has always been: what lies
-        deeper than it can have gone since it was asked last has not come through.
+        The lining of a lip has the other one's skin before it at a corner, behind which it has always been: what was
+        behind and lies deeper than it can have gone since it was asked last has not come through.
         """
         mine, patch, rim = self.sides[side], self.patches[1 - side], self.rims[1 - side]
         points, other = skin[mine], skin[self.sides[1 - side]]
-        watch = watch.at(points, other)
+        was_before, watch = watch.clear(), watch.at(points, other)
         due = watch.due()
         if not len(due):
             none = np.zeros((0, 3))
-            return due, none.astype(int), none, none, due, watch
+            return due, none.astype(int), none, none, watch
         found = Surface(skin, patch).closest(points[due])
         corners = patch[found.faces]
         normal = interpolate(normals, patch, found.faces, found.barycentric)
         way, depth = found.points - points[due], found.distance
         behind = dot(way, normal) > 0
-        through = behind & (depth < watch.reach()[due] + _SLACK_MM)
+        through = behind & (was_before[due] | (depth < watch.reach()[due] + _SLACK_MM))
         maybe = through & (depth > self.options.touch_mm) & (depth < _MOST_MM)
         maybe &= ~(rim[corners] & (found.barycentric > 1e-6)).any(axis=1)
         gone = np.where(through, -depth, 0.0)
         watch = watch.answered(due, np.where(behind, gone, np.minimum(depth, _TRUSTED_MM)))
-        out, at = way[maybe] + self.options.gap_mm * normal[maybe], due[maybe]
-        return mine[at], corners[maybe], found.barycentric[maybe], out, at, watch
+        out = way[maybe] + self.options.gap_mm * normal[maybe]
+        return mine[due[maybe]], corners[maybe], found.barycentric[maybe], out, watch
 
 
 def _winding(vertices, faces, points):

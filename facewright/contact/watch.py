@@ -33,8 +33,12 @@ class Watch:
         """(d,) indices of the points that must be asked, in order."""
         return np.flatnonzero(self._clearance <= 0.0)
 
+    def clear(self):
+        """(k,) bool: points that are known not to have passed the surface."""
+        return self._clearance > 0.0
+
     def reach(self):
-        """(k,) mm by which points may have got past the surface since they were asked."""
+        """(k,) mm by which points that had no clearance may have got past the surface since they were asked."""
         return np.maximum(-self._clearance, 0.0)
 
     def answered(self, index, clearance):
