@@ -68,16 +68,17 @@ class Parting:
     """The skin of one head, asked for crossings in any pose of it that it has not at rest.
 
     vertices (n, 3) mm at rest, faces (m, 3); near (m,) bool: faces that may cross; asked (m,) bool: one of a pair
-    farthest (n,) mm by which vertices are moved at most
+    farthest (n,) mm by which vertices are moved at most; farther (n,) mm: at a second try, where crossings are left
     sides    two (n,) bool: an upper and a lower lip; one meets the other, but is no lining of it
     """
 
-    def __init__(self, vertices, faces, near, asked, farthest, sides=(), options=None):
+    def __init__(self, vertices, faces, near, asked, farthest, sides=(), farther=None, options=None):
         self.options = options or PartingOptions()
         self.used, local = np.unique(faces[near], return_inverse=True)
         self.faces = np.ascontiguousarray(local.reshape(-1, 3))
         self.rest, self.asked, self._n = vertices[self.used], asked[near], len(vertices)
         self._farthest = farthest[self.used, None]
+        self._farther = None if farther is None else farther[self.used, None]
         self._mass = lumped_mass(self.rest, self.faces)
         self._ring = _mean_of_ring(self.faces, len(self.used))
         self._side = np.zeros(len(self.faces), int)  # 1 and 2 for faces of the two sides
@@ -100,16 +101,28 @@ class Parting:
                solids when they came together; default: the poses
         """
         farthest = self._farthest if still is None else np.where(still[self.used, None], 0.0, self._farthest)
-        field = np.zeros_like(self.rest)
-        asked = zip(poses, acts, ways_out)
-        poses = [_Pose(pose[self.used], self._cut(act), way_out) for pose, act, way_out in asked]
-        for pose, first in zip(poses, left):
-            pose.left = first[self.used]
-        for pose in poses[len(poses) - on_way :]:
-            pose.on_way = True
-        for pose in poses[len(poses) - clean :]:
-            pose.looked = pose.skin(field)
-        field, faults = self._parted(poses, field, farthest, self.options.patience)
+        asked = [(pose[self.used], self._cut(act), way_out) for pose, act, way_out in zip(poses, acts, ways_out)]
+
+        def solved(farthest):
+            poses = [_Pose(*each) for each in asked]
+            for pose, first in zip(poses, left):
+                pose.left = first[self.used]
+            for pose in poses[len(poses) - on_way :]:
+                pose.on_way = True
+            for pose in poses[len(poses) - clean :]:
+                pose.looked = pose.skin(np.zeros_like(self.rest))
+            return self._solved(poses, farthest)
+
+        field, faults = solved(farthest)
+        if faults and self._farther is not None:
+            other, of_other = solved(np.where(farthest > 0.0, self._farther, 0.0))
+            if of_other < 0.5 * faults:
+                field = other
+        return self._of_skin(field)
+
+    def _solved(self, poses, farthest):
+        """A field (k, 3), nowhere longer than farthest (k, 1), that leaves the fewest faults, and how many."""
+        field, faults = self._parted(poses, np.zeros_like(self.rest), farthest, self.options.patience)
         for width in self.options.eased_mm:
             other = self._eased(poses, field, farthest, width) if faults else None
             if other is None:
@@ -117,7 +130,7 @@ class Parting:
             other, of_other = self._parted(poses, other, farthest, self.options.eased_patience)
             if of_other < faults:
                 field, faults = other, of_other
-        return self._of_skin(field)
+        return field, faults
 
     def _parted(self, poses, field, farthest, patience):
         """A field (k, 3), from the given one on, that leaves the fewest faults, and how many."""

@@ -79,6 +79,16 @@ def test_no_vertex_goes_farther_than_it_may(pads):
     assert np.linalg.norm(field[~upper], axis=1).max() < 0.01 + 1e-9
 
 
+def test_what_is_left_is_tried_with_skin_that_may_go_farther(pads):
+    V, F, _ = pads
+    every, short, long = np.ones(len(F), bool), np.full(len(V), 0.02), np.full(len(V), 0.5)
+    pose, shallow = pressed(pads, 0.1), pressed(pads, 0.02)
+    once, twice = Parting(V, F, every, every, short), Parting(V, F, every, every, short, farther=long)
+    assert len(self_intersections(pose + once([pose], [1.0], [np.zeros_like]), F))
+    assert not len(self_intersections(pose + twice([pose], [1.0], [np.zeros_like]), F))
+    np.testing.assert_array_equal(*(each([shallow], [1.0], [np.zeros_like]) for each in (once, twice)))
+
+
 def test_nothing_is_parted_into_what_is_solid(pads, parting):
     _, F, upper = pads
     pose = pressed(pads, 0.1)
