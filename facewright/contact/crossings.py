@@ -20,8 +20,8 @@ from facewright.working_set import read_working_set
 
 _REACH_MM = {"lip_seam": 25.0, "lid_": 10.0, "nostril": 14.0}  # from these lines: skin that may come to cross
 _SEEN_MM, _HIDDEN_MM, _MARGIN_MM = 0.5, 1.5, 0.08  # by which skin is moved at most
-# Where crossings are left, skin that is not at the eyes is tried so much farther: a corner of the mouth of two of seven
-# scanned faces on ICT, which mouthRollUpper folds, keeps 23 and 40 pairs with 0.5 mm, 1 and none with 1.5.
+# Where crossings are left, skin that is not at the eyes is tried so much farther: a corner of the mouth that
+# mouthRollUpper folds on ICT (a scan, a simulated face) keeps 23 and 40 pairs with 0.5 mm, 1 and none with 1.5.
 _FARTHER = 3.0
 _FAR_MM = 20.0  # a shape that goes farther may cross elsewhere, as chin and neck do,
 _MOVES_MM = 1.0  # where an open jaw moves the skin by so much
@@ -57,11 +57,10 @@ class _Crossings:
             reach = next((reach for start, reach in _REACH_MM.items() if name.startswith(start)), None)
             if reach is None:
                 continue
-            if name.startswith("lid_"):
-                farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
             there = cKDTree(self.V[line]).query(self.V, distance_upper_bound=reach)[0] < reach
             near |= there
             if name.startswith("lid_"):
+                farthest[line] = _MARGIN_MM  # margins lie on the ball, in a smooth line
                 lids |= there
         farther = np.where(lids, farthest, _FARTHER * farthest)  # shut lids that move so far show the ball
         # Skin and lining nearest to a corner of the mouth may cross as one turned inside out.

@@ -103,7 +103,7 @@ class Parting:
         farthest = self._farthest if still is None else np.where(still[self.used, None], 0.0, self._farthest)
         asked = [(pose[self.used], self._cut(act), way_out) for pose, act, way_out in zip(poses, acts, ways_out)]
 
-        def solved(farthest):
+        def fresh():
             poses = [_Pose(*each) for each in asked]
             for pose, first in zip(poses, left):
                 pose.left = first[self.used]
@@ -111,13 +111,16 @@ class Parting:
                 pose.on_way = True
             for pose in poses[len(poses) - clean :]:
                 pose.looked = pose.skin(np.zeros_like(self.rest))
-            return self._solved(poses, farthest)
+            return poses
 
-        field, faults = solved(farthest)
+        tried = fresh()
+        field, faults = self._solved(tried, farthest)
         if faults and self._farther is not None:
-            other, of_other = solved(np.where(farthest > 0.0, self._farther, 0.0))
-            if of_other < 0.5 * faults:
-                field = other
+            farther = np.where(farthest > 0.0, self._farther, 0.0)
+            met = np.concatenate([pose.met for pose in tried])
+            if (farther > farthest)[self.faces[met]].any():
+                other, of_other = self._solved(fresh(), farther)
+                field = other if of_other < 0.5 * faults else field
         return self._of_skin(field)
 
     def _solved(self, poses, farthest):

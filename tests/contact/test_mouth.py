@@ -212,3 +212,6 @@ def test_a_crossing_is_no_deeper_than_lips_have_moved(solved):
     pushed = rest.copy()
     pushed[lower] += [0.0, 2.0, 0.0]
     assert 1.0 < mouth.crossing(pushed) < 2.3
+    # What lay behind the other lip at rest, without being in it, is not in it where nothing moves.
+    mouth.skin, mouth.entered = replace(mouth.skin, vertices=pushed), np.zeros(len(rest))
+    assert mouth.crossing(pushed) < 0.3

@@ -8,7 +8,7 @@ from facewright.evaluate.iris import color_difference
 from facewright.mesh.render import linear_to_srgb
 from facewright.parts.assemble import _as_seen
 from facewright.parts.iris import PATTERNS, WHITE, EyeLook, eye_colors
-from facewright.parts.iris_scan import Iris, _circle, _colors, _opening
+from facewright.parts.iris_scan import LUMINANCE, Iris, _circle, _colors, _opening
 
 COLOR = (0.06, 0.10, 0.15)
 
@@ -90,7 +90,7 @@ def test_whites_are_dimmed_towards_those_of_the_scan(share):
     iris = seen((0.10, 0.12, 0.14), share * np.array(WHITE))
     told = {"iris_color": iris.lit_color, "eye_light": iris.light, "eye_white": iris.whiteness}
     look = _as_seen(EyeLook(), told)
-    white = np.dot(look.sclera_color, [0.2126, 0.7152, 0.0722]) / np.dot(WHITE, [0.2126, 0.7152, 0.0722])
+    white = LUMINANCE @ look.sclera_color / (LUMINANCE @ WHITE)
     assert max(share, 0.6) <= white + 1e-9 and white <= max(np.sqrt(share), 0.6) + 1e-9
     if iris.light == 1.0:
         np.testing.assert_allclose(look.iris_color, iris.color)
