@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from facewright.contact.gaze import gaze_rotation, look_shapes
 from facewright.contact.lids import LidMotionOptions, Lids
+from facewright.contact.meeting import along_line
 from facewright.contact.pouch import LidLining
 from facewright.contact.retraction import needed_retraction
 from facewright.contact.rims import from_ends
@@ -27,9 +28,10 @@ from facewright.transfer.eyeball import carried_eyeball, eye_parts
 HALF = 0.5
 _PRESSING_LOOKS, _RAISING = ("Down", "Out"), ("cheekSquint", "noseSneer")
 _BLINK_STEPS = 0.35, 0.7, 1.0  # a lid turns farthest; chords of a third of its way stay out of the ball
-_FULLNESS = 0.6
+_FULLNESS, _STILL_MM = 0.6, 5.0  # of margins that turn; so far from the canthi they turn less, which stay
 _CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
-_CORNER_MM = 2.0
+_CORNER_MM = 6.0
+_MOST_SHUT, _SOFT_RAD = 0.6, 0.03  # of the opening, by which lids that follow the gaze shut; how softly that sets in
 _SHUT_FOLLOWS = 0.4  # of what the lower lid alone follows the gaze: shut lids that went as far would hang in a U
 
 
@@ -133,7 +135,10 @@ class _Eye:
         near = distance < options.free_mm
         lining = faces[(socket[faces] & near[faces]).any(axis=1)]
         self.lining = LidLining(self.V, self.lid_faces, lining, distance, socket & near, self.ball.center)
-        self.profiles = [_profile(self.V[chain]) for chain in (upper, lower)]
+        self.profiles = [
+            _profile(self.V[chain]) ** _FULLNESS * smooth_step(from_ends(self.V[chain], _STILL_MM))
+            for chain in (upper, lower)
+        ]
 
     def shapes(self, names, deltas):
         """shape name -> {weight: (n, 3) delta} of this eye's shapes that the template has."""
@@ -205,7 +210,7 @@ class _Eye:
         if direction:
             # A sine: with the fuller profile of open lids the closing line would drop at the corners and run in a U.
             degrees = _SHUT_FOLLOWS * self.options.look_turn_deg[direction][1]
-            turn = np.radians(degrees) * self.profiles[1] ** (1.0 / _FULLNESS)
+            turn = np.radians(degrees) * _profile(self.V[self.lids.lower])
         else:
             turn = self.lids.turn_of(shut, motion)
         return self._full(self.lids.carried(shut, motion, turn, ball), shut + motion)
@@ -274,6 +279,10 @@ class _Eye:
 
     def _by_degrees(self, pose, degrees, weight, ball):
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
+        at, (open_u, _) = pose @ self.lids.axis, self.lids.opening(pose)
+        # Towards a corner, which may be narrow, the upper margin would pass the lower one.
+        least = along_line(at[self.lids.upper], at[self.lids.lower], lower) - _MOST_SHUT * np.maximum(open_u, 0.0)
+        upper = 0.5 * (upper + least + np.hypot(upper - least, _SOFT_RAD))
         return self.lids.settled(self.lids.turned(pose, upper, lower, ball), ball)
 
     def _full(self, pose, base=None):
@@ -287,4 +296,4 @@ class _Eye:
 def _profile(chain):
     """(k,) 0 at the canthi, 1 over the middle of a margin."""
     steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
-    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0) ** _FULLNESS
+    return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0)

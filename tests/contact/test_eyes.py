@@ -62,6 +62,18 @@ def test_eyeballs_turn_rigidly_by_the_stated_angles(solved):
             assert shrunk.min() > 0.99
 
 
+def test_lids_that_follow_the_gaze_leave_the_corners_where_they_are(solved):
+    for face, eyes in solved:
+        pose = posed(face, eyes, {"eyeLookDownLeft": 1.0})
+        upper, lower = (face.lines[f"lid_{lid}_left"] for lid in ("upper", "lower"))
+        near = np.linalg.norm(face.vertices - face.vertices[upper[-1]], axis=1) < 2.0
+        moved = np.linalg.norm(pose - face.vertices, axis=1)
+        assert moved[upper].max() > 2.0 and moved[near & np.isin(np.arange(len(near)), [*upper, *lower])].max() < 0.6
+        at = face.vertices[upper[-1], 0] - np.linspace(2.0, 12.0, 20)
+        heights = [np.interp(at, *pose[line][np.argsort(pose[line][:, 0]), :2].T) for line in (upper, lower)]
+        assert (heights[0] > heights[1]).all()
+
+
 def test_left_is_the_mirror_of_right(hm08, solved):
     _, eyes = solved[0]
     targets = dict(zip(hm08.shape_names, eyes.deltas)) | eyes.extras

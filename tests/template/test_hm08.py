@@ -95,6 +95,16 @@ def test_lids_lie_on_the_ball_and_nothing_enters_it(hm08, skin_faces):
         assert len(self_intersections(hm08.vertices, np.concatenate([skin_faces, eye]))) == 0
 
 
+def test_eyes_end_in_a_point(hm08):
+    upper, lower = (hm08.vertices[hm08.lines[f"lid_{lid}_left"]] for lid in ("upper", "lower"))
+    for off, most in ((1.0, 2.0), (2.0, 3.8), (3.0, 5.2)):
+        above, below = (np.interp(upper[-1, 0] - off, *line[np.argsort(line[:, 0]), :2].T) for line in (upper, lower))
+        assert 0.5 * off < above - below < most
+    for line in (upper, lower):  # and no vertex is crowded out
+        steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        assert steps.min() > 0.1
+
+
 def test_lips_are_closed(hm08, skin_faces):
     upper, lower = hm08.lines["lip_seam_upper"], hm08.lines["lip_seam_lower"]
     assert upper[0] == lower[0] and upper[-1] == lower[-1] and len(upper) == len(lower)

@@ -18,6 +18,7 @@ from facewright.template.landmarks import template_landmarks
 from facewright.template.modifiers import Modifiers, build_modes, mean_weights
 from facewright.template.rules import symmetric_shapes
 from facewright.transfer.riders import ride_on_lids
+from hm08.canthi import Taper
 from hm08.carry import Carrier
 from hm08.control import build_control
 from hm08.head import build_head
@@ -122,12 +123,14 @@ def build_asset(source, *, say=lambda text: None):
     head = deepen_fold(head, regions)
     say("atlas")
     uv, uv_polygons, _ = build_atlas(head.V, head.polygons, head.mirror, regions, head.V_open)
+    taper = Taper(head)
+    head = taper.tapered_head()
     assembly, tongue_out = _assemble(head, uv, uv_polygons)
     say("shapes")
     raw = read_face_units(source, n_base, ARKIT_SHAPES)[:, control.original] * control.scale
     turns = {name: _jaw_motion(name, raw, control) for name in JAW_SHAPES}
     jaw = turns["jawOpen"]
-    skin_deltas = build_shapes(raw[:, : control.n_skin], control, head, regions, jaw)
+    skin_deltas = taper.carried(build_shapes(raw[:, : control.n_skin], control, taper.head, regions, jaw))
     shapes = _with_parts(skin_deltas, turns, head, assembly, tongue_out)
     say("identity")
     names, fields = _carried(names, deltas, macros, control, head)

@@ -39,7 +39,7 @@ LASHES = (
     Lash("upper", 2.0, 6.6, (-30.0, 36.0), 24, 4, (0.5, 1.0)),
     Lash("lower", 1.7, 4.4, (8.0, 58.0), 22, 4, (0.0, 0.5)),
 )
-LASH_ENDS = (0.10, 0.97)  # of the margin's length, from the inner corner
+LASH_ENDS = (0.10, 0.94)  # of the margin's length, from the inner corner
 FAN = 0.55  # how far the outermost lashes lean to the sides
 STRIP_COLUMNS = 28
 # mm into the opening of each row. Strips lie that far off the ball that their chords do not cut into the cornea.
