@@ -137,14 +137,14 @@ def _film(lids):
 
 
 def _into_opening(lids, lid, rows, off):
-    """(rows, columns, 3): the margin, then rows into the opening on the eyeball, no farther than its middle."""
+    """(rows, columns, 3): the margin, then rows into the opening on the eyeball, closer where it is narrower than them."""
     share = np.linspace(0.0, 1.0, STRIP_COLUMNS)
     points, _, _, across = lids.at(lid, share)
     other = lids.at("lower" if lid == "upper" else "upper", share)[0]
     room = 0.5 * np.linalg.norm(other - points, axis=1)
     result = [points]
     for into in rows[1:]:
-        step = np.minimum(into, room)[:, None]
+        step = (into * np.minimum(room / rows[-1], 1.0))[:, None]
         on_ball = at_height(points - step * across, lids.center, off)
         # At the corners the margins stand off the ball: there the strip slopes down to it.
         result.append(on_ball)
