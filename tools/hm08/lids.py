@@ -137,7 +137,7 @@ def _film(lids):
 
 
 def _into_opening(lids, lid, rows, off):
-    """(rows, columns, 3): the margin, then rows into the opening on the eyeball, closer where it is narrower than them."""
+    """(rows, columns, 3): the margin, then rows into the opening on the eyeball; closer together where it is narrow."""
     share = np.linspace(0.0, 1.0, STRIP_COLUMNS)
     points, _, _, across = lids.at(lid, share)
     other = lids.at("lower" if lid == "upper" else "upper", share)[0]
