@@ -9,6 +9,8 @@ from facewright.mesh.raster import Camera, RayScene
 
 MM_PER_PX = 0.2
 WIDTH_MM, HEIGHT_MM = 44.0, 34.0
+# Slits between shut lids are 0.01 mm wide: at 0.2 mm a pixel 0.08 mm2 were found of one of 0.02 and nothing of others.
+SLIT_MM_PER_PX, SLIT_WIDTH_MM, SLIT_HEIGHT_MM = 0.05, 40.0, 22.0
 NEAR_MM = 70.0
 BLINK_VIEWS = ((0.0, 0.0), (-30.0, 0.0), (30.0, 0.0), (0.0, -30.0))
 SKIN_VIEWS = BLINK_VIEWS[:3]
@@ -42,9 +44,9 @@ class EyeView:
         scene = RayScene(np.vstack([skin, *balls]), np.concatenate([self.faces, *self.ball_faces]))
         most = 0
         for view in views:
-            hits = scene.cast(*self._rays(view))
+            hits = scene.cast(*self._rays(view, SLIT_WIDTH_MM, SLIT_HEIGHT_MM, SLIT_MM_PER_PX))
             most = max(most, int((hits.face >= len(self.faces)).sum()))
-        return most * MM_PER_PX**2
+        return most * SLIT_MM_PER_PX**2
 
     def through_lids_mm2(self, skin, balls, views=SKIN_VIEWS, lining=False):
         """Largest area where the ball stands before the lid skin that should hide it, from one of the views, mm2.
@@ -56,7 +58,7 @@ class EyeView:
         lids, normals = RayScene(skin, lid_faces), face_normals(skin, lid_faces)
         most = 0
         for view in views:
-            origins, directions = self._rays(view)
+            origins, directions = self._rays(view, WIDTH_MM, HEIGHT_MM, MM_PER_PX)
             hits = scene.cast(origins, directions)
             seen = hits.face >= len(self.faces)
             if lining:
@@ -71,6 +73,6 @@ class EyeView:
             most = max(most, int(facing.sum()))
         return most * MM_PER_PX**2
 
-    def _rays(self, view):
-        size = (round(HEIGHT_MM / MM_PER_PX), round(WIDTH_MM / MM_PER_PX))
-        return Camera.looking_at(self.center, *view, HEIGHT_MM / 2, size).rays()
+    def _rays(self, view, width_mm, height_mm, mm_per_px):
+        size = (round(height_mm / mm_per_px), round(width_mm / mm_per_px))
+        return Camera.looking_at(self.center, *view, height_mm / 2, size).rays()
