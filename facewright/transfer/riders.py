@@ -103,7 +103,9 @@ class LidRiders:
         before = np.concatenate([np.append(chain[0], chain[:-1]) for chain in chains])
         after = np.concatenate([np.append(chain[1:], chain[-1]) for chain in chains])
         root = interpolate(template.vertices, template.faces, self.root_faces, self.root_barycentric)
-        nearest = cKDTree(template.vertices[margin]).query(root)[1]
+        # The canthi are in both chains: which of the two is found must not differ from left to right.
+        once = np.unique(margin, return_index=True)[1]
+        nearest = once[cKDTree(template.vertices[margin[once]]).query(root)[1]]
         return before[nearest], after[nearest]
 
 

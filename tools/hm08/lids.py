@@ -45,9 +45,9 @@ STRIP_COLUMNS = 28
 # mm into the opening of each row. Strips lie that far off the ball that their chords do not cut into the cornea.
 OCCLUSION = {"upper": (-0.3, 0.35, 1.0, 1.9, 3.0, 4.6), "lower": (-0.3, 0.35, 0.9, 1.7, 2.6)}
 BLEND = {"upper": (-0.3, 0.12, 0.45), "lower": (-0.3, 0.15, 0.6)}
-FILM = (-0.1, 0.18, 0.5)
-CARUNCLE_MM = (2.3, 1.5, 1.1)
-CARUNCLE_SHARE = 0.075
+FILM, FILM_ENDS = (-0.1, 0.18, 0.5), (0.07, 0.97)  # its mirroring tip would stand out of a canthus as a white splinter
+CARUNCLE_MM = (1.8, 1.15, 0.7)
+CARUNCLE_SHARE = 0.05
 
 
 class Lids:
@@ -131,14 +131,14 @@ def _strips(lids, rows, off):
 
 def _film(lids):
     """The tear film: a narrow slope from the lower margin onto the eyeball."""
-    points = _into_opening(lids, "lower", FILM, 0.05)
+    points = _into_opening(lids, "lower", FILM, 0.05, FILM_ENDS)
     points[1] += 0.12 * normalized(points[1] - lids.center)
     return _grid(points, np.linspace(0, 1, len(points)), over=True)
 
 
-def _into_opening(lids, lid, rows, off):
+def _into_opening(lids, lid, rows, off, ends=(0.0, 1.0)):
     """(rows, columns, 3): the margin, then rows into the opening on the eyeball; closer together where it is narrow."""
-    share = np.linspace(0.0, 1.0, STRIP_COLUMNS)
+    share = np.linspace(*ends, STRIP_COLUMNS)
     points, _, _, across = lids.at(lid, share)
     other = lids.at("lower" if lid == "upper" else "upper", share)[0]
     room = 0.5 * np.linalg.norm(other - points, axis=1)
