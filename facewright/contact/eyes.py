@@ -23,6 +23,7 @@ from facewright.contact.targets import Targets, is_even
 from facewright.conventions import corrective_name, in_between_name
 from facewright.mesh.fade import smooth_step
 from facewright.mesh.normals import max_norms
+from facewright.mesh.polyline import arc_lengths
 from facewright.transfer.eyeball import carried_eyeball, eye_parts
 
 HALF = 0.5
@@ -30,8 +31,8 @@ _PRESSING_LOOKS, _RAISING = ("Down", "Out"), ("cheekSquint", "noseSneer")
 _BLINK_STEPS = 0.35, 0.7, 1.0  # a lid turns farthest; chords of a third of its way stay out of the ball
 _FULLNESS, _STILL_MM = 0.6, 5.0  # of margins that turn; so far from the canthi they turn less, which stay
 _CHEEK_MM = 14.0, 30.0  # from the margins: so far a template's squint counts whole, and not at all
-_CORNER_MM = 6.0
-_MOST_SHUT, _SOFT_RAD = 0.6, 0.03  # of the opening, by which lids that follow the gaze shut; how softly that sets in
+_CORNER_MM = 6.0  # so far from the canthi margins go with the skin in a squint: the nearer, the more
+_MOST_SHUT, _SOFT_SHARE = 0.6, 0.1  # of the opening, by which lids that follow the gaze shut; how softly that sets in
 _SHUT_FOLLOWS = 0.4  # of what the lower lid alone follows the gaze: shut lids that went as far would hang in a U
 
 
@@ -279,10 +280,11 @@ class _Eye:
 
     def _by_degrees(self, pose, degrees, weight, ball):
         upper, lower = (np.radians(turn) * weight * profile for turn, profile in zip(degrees, self.profiles))
-        at, (open_u, _) = pose @ self.lids.axis, self.lids.opening(pose)
-        # Towards a corner, which may be narrow, the upper margin would pass the lower one.
-        least = along_line(at[self.lids.upper], at[self.lids.lower], lower) - _MOST_SHUT * np.maximum(open_u, 0.0)
-        upper = 0.5 * (upper + least + np.hypot(upper - least, _SOFT_RAD))
+        if degrees[0] < degrees[1]:
+            # Towards a corner, which may be narrow, the upper margin would pass the lower one.
+            at, opening = pose @ self.lids.axis, np.maximum(self.lids.opening(pose)[0], 0.0)
+            least = along_line(at[self.lids.upper], at[self.lids.lower], lower) - _MOST_SHUT * opening
+            upper = 0.5 * (upper + least + np.hypot(upper - least, _SOFT_SHARE * opening))
         return self.lids.settled(self.lids.turned(pose, upper, lower, ball), ball)
 
     def _full(self, pose, base=None):
@@ -295,5 +297,5 @@ class _Eye:
 
 def _profile(chain):
     """(k,) 0 at the canthi, 1 over the middle of a margin."""
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    steps = arc_lengths(chain)
     return np.maximum(np.sin(np.pi * steps / steps[-1]), 0.0)

@@ -6,6 +6,7 @@ import numpy as np
 
 from facewright.mesh.fade import smooth_step
 from facewright.mesh.normals import normalized
+from facewright.mesh.polyline import arc_lengths
 
 _ENDS_MM = 2.0  # from a canthus: there it sets in
 _CORNER_MM = 3.0  # the same of rims that leave the corners alone
@@ -87,5 +88,5 @@ def _hung(vertices, side, line):
 
 def from_ends(chain, reach_mm=_ENDS_MM):
     """(k,) 0 at the ends of a chain of points (k, 3), 1 from reach_mm on."""
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    steps = arc_lengths(chain)
     return np.clip(np.minimum(steps, steps[-1] - steps) / reach_mm, 0.0, 1.0)

@@ -15,6 +15,7 @@ from facewright.evaluate.rows import Row
 from facewright.evaluate.shapes import shape_names
 from facewright.mesh.adjacency import vertex_components
 from facewright.mesh.closest import Surface
+from facewright.mesh.polyline import arc_lengths
 from facewright.mesh.raster import Camera, RayScene
 
 INSIDE = ("teeth_", "gums_", "tongue")
@@ -223,5 +224,5 @@ def _strip(upper, lower):
 
 
 def _along(line):
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    steps = arc_lengths(line)
     return steps / max(steps[-1], 1e-12)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from facewright.mesh.polyline import arc_lengths
 from facewright.mesh.spread import spread_smoothly
 from facewright.transfer.eyeball import angle_from, eye_parts, lid_clearance, measure_eyeball
 
@@ -99,7 +100,7 @@ def _margin(vertices, lines, side):
 
 def _along(chain):
     """(k,) arc length from 0 to 1 along points (k, 3)."""
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    steps = arc_lengths(chain)
     return steps / max(steps[-1], 1e-12)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening, gaussian_filter1d, median_filter
 
+from facewright.mesh.polyline import arc_lengths
 from facewright.mesh.raster import RayScene
 
 # A valley this deep is plain in clay; a line this much darker than its sides is plain in a photograph. In a shallow
@@ -231,7 +232,7 @@ def _ends(strength, columns, model_start, model_end, options):
 
 
 def _resample(points, step):
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    length = arc_lengths(points)
     count = max(8, round(length[-1] / step))
     fractions = np.linspace(0, 1, count)
     return resample_line(points, fractions, length), fractions
@@ -240,12 +241,12 @@ def _resample(points, step):
 def resample_line(points, fractions, length=None):
     """(k, 3) points of a polyline at fractions (k,) of its arc length."""
     if length is None:
-        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        length = arc_lengths(points)
     at = np.asarray(fractions) * length[-1]
     return np.stack([np.interp(at, length, points[:, axis]) for axis in range(3)], axis=1)
 
 
 def arc_fractions(points):
     """(k,) arc length from the start as a fraction of the whole."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    length = arc_lengths(points)
     return length / max(length[-1], 1e-12)

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from facewright.errors import StageError
 from facewright.mesh.polygons import polygon_adjacency, polygon_edges, polygon_half_edges
+from facewright.mesh.polyline import arc_lengths
 
 
 def separating_loop(vertices, polygons, inside, outside, *, edge_factor=None):
@@ -147,10 +148,7 @@ def paired(vertices, first, second, *, skip_mm=0.6):
     sum over pairs |difference in arc length| + skip_mm per vertex left out (dynamic programming as for text).
     Arc lengths count in the mean length of both chains.
     """
-    lengths = [
-        np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices[c], axis=0), axis=1))])
-        for c in (first, second)
-    ]
+    lengths = [arc_lengths(vertices[c]) for c in (first, second)]
     total = 0.5 * (lengths[0][-1] + lengths[1][-1])
     s, t = (length / length[-1] * total for length in lengths)
     a, b = len(first), len(second)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from facewright.mesh.polyline import arc_lengths
 from facewright.solve.procrustes import best_rotation, best_similarity
 from facewright.transfer.deformation import DeformationTransfer, Links
 from facewright.transfer.lids import ContactOptions, clear_lids
@@ -134,7 +135,7 @@ def _pair_lines(one, other, vertices, weight, by_gap):
 
 def _along(chain):
     """(k,) arc length from 0 to 1 along points (k, 3)."""
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1)))
+    steps = arc_lengths(chain)
     return steps / max(steps[-1], 1e-12)
 
 

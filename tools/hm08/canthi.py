@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from facewright.mesh.normals import normalized
+from facewright.mesh.polyline import arc_lengths
 from hm08.eyeball import at_height, height_above
 from hm08.neutral import LID_GAP_MM, clear_of_ball
 from hm08.spread import spread
@@ -65,7 +66,7 @@ def tapered(line, slope):
     A cubic curve leads there from where the margin is REACH_MM aside of it. Vertices keep their shares of the way.
     """
     own = (line[-1, :2] - line[::-1, :2]) * [1.0, -1.0]  # mm inwards and up from the corner
-    way = _lengths(own)
+    way = arc_lengths(own)
     stop = int(np.argmax(own[:, 0] > REACH_MM))
     height, length = (np.interp(REACH_MM, own[: stop + 1, 0], values[: stop + 1]) for values in (own[:, 1], way))
     start = np.array([REACH_MM, height])
@@ -74,17 +75,12 @@ def tapered(line, slope):
     third = np.linalg.norm(start) / 3
     t = np.linspace(0.0, 1.0, 400)[:, None]
     curve = t**3 * start + 3 * t**2 * (1 - t) * (start + third * leaves) - 3 * t * (1 - t) ** 2 * third * arrives
-    along = _lengths(curve)
+    along = arc_lengths(curve)
     result = line[:, :2].copy()
     for axis, sign in ((0, -1.0), (1, 1.0)):
         new = np.interp(way[1:stop] / length, along / along[-1], curve[:, axis])
         result[::-1][1:stop, axis] = line[-1, axis] + sign * new
     return result
-
-
-def _lengths(points):
-    """(k,) mm from the first of points (k, 2) along them."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
 def _shares(upper, lower, points):
@@ -95,7 +91,7 @@ def _shares(upper, lower, points):
 
 
 def _interpolation(x, at):
-    """(k, n) rows that interpolate values at x (n,), in rising order, linearly at (k,)."""
+    """(k, n) rows that interpolate values at x (n,) linearly at (k,); x rises about these."""
     after = np.clip(np.searchsorted(x, at), 1, len(x) - 1)
     share = np.clip((at - x[after - 1]) / np.maximum(x[after] - x[after - 1], 1e-9), 0.0, 1.0)
     rows = np.zeros((len(at), len(x)))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from facewright.mesh.polyline import arc_lengths
 from hm08.subdivide import adaptive, balanced, catmull_clark
 from hm08.topology import QuadTopology
 
@@ -105,7 +106,7 @@ class ColumnWarp:
     def __init__(self, mouth, points):
         old = np.arange(0, 4 * 19 + 1) / 4
         ring = points[[mouth[(4 * SEAM_RING, round(4 * c))] for c in old]]
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+        arc = arc_lengths(ring)
         corner = np.interp(OLD_CORNER, old, arc)
         t = np.linspace(0.0, 1.0, 96)  # 0 at the middle of a lip, 1 at the corner
         below = np.interp(t * OLD_CORNER, old, arc) / corner

@@ -11,6 +11,7 @@ import numpy as np
 
 from facewright.mesh.closest import Surface
 from facewright.mesh.normals import normalized
+from facewright.mesh.polyline import arc_lengths
 from hm08.eyeball import at_height
 from hm08.parts import Piece
 from hm08.teeth import turned_over
@@ -72,7 +73,7 @@ class Lids:
 
 
 def _sampled(line, share):
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    steps = arc_lengths(line)
     return np.stack([np.interp(share, steps / steps[-1], line[:, c]) for c in range(3)], axis=1)
 
 

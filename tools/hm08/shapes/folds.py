@@ -6,6 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from facewright.mesh.normals import vertex_normals
+from facewright.mesh.polyline import arc_lengths
 
 MIDDLE_MM = 4.0  # half the width over which the fold of one side hands over to that of the other
 
@@ -18,7 +19,7 @@ class Fold:
 
     def __init__(self, canvas, through):
         points = np.array([canvas.place(name) for name in through])
-        steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+        steps = arc_lengths(points)
         share = np.linspace(0.0, 1.0, 200)
         if not canvas.off_middle(through[0]):  # goes on to the right, else it would have a kink in the middle
             points = np.concatenate([points[:0:-1] * [-1, 1, 1], points])

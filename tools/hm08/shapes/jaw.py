@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from facewright.mesh.polyline import arc_lengths
 from hm08.regions import geodesic
 from hm08.shapes.fair import falloff
 from hm08.skeleton import hinge_of
@@ -22,7 +23,7 @@ SHARE = 0.25  # of the jaw's turn by which closed lips go down with it
 def rounded(head, jaw_open):
     """(n, 3) jawOpen with a lower lip that hangs in a round arc; the upper lip stays, the skin around follows."""
     V, lower, upper = head.V, head.lines["lip_seam_lower"], head.lines["lip_seam_upper"]
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(V[lower], axis=0), axis=1))])
+    way = arc_lengths(V[lower])
     q = 1.0 - np.abs(2.0 * way / way[-1] - 1.0)
     corners = 0.5 * (jaw_open[lower[0]] + jaw_open[lower[-1]])
     middle = jaw_open[lower[np.argmax(q)]] - corners

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from facewright.mesh.normals import normalized
+from facewright.mesh.polyline import arc_lengths
 from hm08.density import NEW_CORNER, SEAM_RING
 
 CORNER_COLUMN = round(4 * NEW_CORNER)
@@ -93,7 +94,7 @@ def lip_sections(head):
     tangent[[0, -1]] = [1.0, 0.0, 0.0]
     tangent = normalized(tangent)
     i = column // 2
-    steps = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(seam, axis=0), axis=1)))
+    steps = arc_lengths(seam)
     # By length: the columns crowd at the corner.
     share = np.where(columns <= CORNER_COLUMN, steps / steps[half], (steps[-1] - steps) / (steps[-1] - steps[half]))
     t = share[i]
