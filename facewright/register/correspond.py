@@ -97,19 +97,16 @@ class Target:
         self.normals = vertex_normals(self.vertices, self.faces)
         self.border = border_vertices(self.faces, len(self.vertices))
         self.roughness = np.ones(len(self.vertices))
-        self.hair, self.off_skin = np.zeros((2, len(self.vertices)))
+        self.hair = np.zeros(len(self.vertices))
         self.openness = np.ones(len(self.vertices)) if openness is None else np.asarray(openness)
 
     def tell_skin(self, skin_points, hair):
-        """Set self.roughness (n,) relative to the scan's skin, known to lie near skin_points (k, 3), and its colours'.
-
-        hair: hair.HairColor, which becomes self.hair (dark) and self.off_skin
-        """
+        """Set self.hair (n,), and self.roughness (n,) relative to the skin: known to lie near skin_points (k, 3)."""
         degrees = roughness_deg(self.vertices, self.faces)
         skin = self.surface.closest(skin_points)
         typical = np.median(interpolate(degrees, self.faces, skin.faces, skin.barycentric))
         self.roughness = degrees / max(float(typical), 3.0)
-        self.hair, self.off_skin = hair
+        self.hair = hair
 
     def smoothed(self, edge_mm):
         """The same Target without the scanner's noise: what is finer than about PASS_MM is gone, the rest stays.
@@ -122,7 +119,7 @@ class Target:
         pass_mm = max(PASS_MM, FACET_PASS * edge_mm)
         while edge_mm > FINE_MM:
             edges, smooth.faces = split_in_four(smooth.faces, len(smooth.vertices))
-            for name in ("vertices", "roughness", "hair", "off_skin", "openness"):
+            for name in ("vertices", "roughness", "hair", "openness"):
                 setattr(smooth, name, with_midpoints(getattr(smooth, name), edges))
             edge_mm /= 2
         smooth.surface = Surface(_low_pass(smooth.vertices, smooth.faces, edge_mm, pass_mm), smooth.faces)

@@ -1,46 +1,29 @@
-"""What a scan's colours tell of hair: far darker than the skin beside it, or of another hue."""
+"""What a scan's colours tell of hair: it is far darker than the skin beside it."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from facewright.mesh.closest import Surface, interpolate
 from facewright.mesh.normals import face_areas
-from facewright.mesh.render import LUMA, srgb_to_linear
+from facewright.mesh.render import LUMA
 from facewright.register.colors import surface_colors
 
 # Brightness (sRGB, of the nearest skin's): what is surely hair, what may be skin in the shade.
 SURELY, HARDLY = 0.35, 0.55
-# Distance from the nearest skin in the logarithms of red and blue over green (linear): ears that are redder than the
-# cheek, or in the shade, stay below the first, grey and black hair lie beyond the second.
-ALIKE, UNLIKE = 0.2, 0.45
-DARK = 1e-3  # linear; the hue of what is darker is the scanner's noise
 NEAREST = 3
 WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
 """(s, 3) places on a face whose colours stand for it."""
 FINE = 100_000  # faces, of which one place each is enough
 
 
-class HairColor(NamedTuple):
-    """For each vertex of a scan 0..1.
-
-    dark      (n,) how surely it is hair by being far darker than skin: a shade may be as dark
-    off_skin  (n,) how surely it is not skin, by its hue; what is dark counts as far as its hue differs at all
-    """
-
-    dark: np.ndarray
-    off_skin: np.ndarray
-
-
 def hair_by_color(scan, skin_points):
-    """HairColor of a Scan, 0 without colours.
+    """(n,) 0..1 how surely vertices of a Scan are hair by being far darker than skin; 0 without colours.
 
     skin_points (k, 3) mm: places known to be skin, all over the face, so that light from one side is no hair
     """
-    nothing = HairColor(*np.zeros((2, len(scan.vertices))))
+    nothing = np.zeros(len(scan.vertices))
     colors = _colors(scan)
     if colors is None:
         return nothing
@@ -52,16 +35,7 @@ def hair_by_color(scan, skin_points):
         return nothing
     nearest = cKDTree(points).query(scan.vertices, min(NEAREST, len(points)))[1].reshape(len(scan.vertices), -1)
     share = colors @ LUMA / np.maximum((known @ LUMA)[nearest].mean(axis=1), 1e-3)
-    dark = np.nan_to_num(np.clip((HARDLY - share) / (HARDLY - SURELY), 0.0, 1.0))
-    apart = np.nan_to_num(np.linalg.norm(_hue(colors) - _hue(known)[nearest].mean(axis=1), axis=1))
-    other = np.clip((apart - ALIKE) / (UNLIKE - ALIKE), 0.0, 1.0)
-    return HairColor(dark, np.maximum(other, dark * np.minimum(apart / ALIKE, 1.0)))
-
-
-def _hue(colors):
-    """(k, 2) logarithms of red and blue over green of sRGB colours (k, 3): what a light's strength leaves alone."""
-    linear = np.maximum(srgb_to_linear(colors), DARK)
-    return np.log(linear[:, [0, 2]] / linear[:, [1]])
+    return np.nan_to_num(np.clip((HARDLY - share) / (HARDLY - SURELY), 0.0, 1.0))
 
 
 def _colors(scan):
