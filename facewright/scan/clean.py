@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from facewright.errors import InputError
-from facewright.mesh.adjacency import border_edges, border_loops, face_components
+from facewright.mesh.adjacency import border_edges, border_loops, face_components, half_edges
 from facewright.mesh.normals import face_areas, face_cross, face_normals
 from facewright.mesh.raster import RayScene
 
@@ -126,11 +126,29 @@ def duplicate_faces(faces):
 
 
 def crumbs(vertices, faces):
-    """(m,) bool: the face belongs to a component under CRUMB_SHARE of the largest one's area; and their number."""
-    component = face_components(faces, len(vertices))
-    areas = np.bincount(component, weights=face_areas(vertices, faces))
-    small = (areas > 0) & (areas < CRUMB_SHARE * areas.max())
-    return small[component], int(small.sum())
+    """(m,) bool: faces of pieces under CRUMB_SHARE of the largest one's area; and the number of these pieces.
+
+    A piece is what hangs together by vertices. So is what hangs on an edge of two other faces and ends in the air, as a
+    card of lashes whose roots are points of the lid.
+    """
+    areas = face_areas(vertices, faces)
+    floating, n_floating = _small(face_components(faces, len(vertices)), areas)
+    patch = np.asarray(igl.bfs_orient(np.ascontiguousarray(faces))[1])
+    hanging = _small(patch, areas)[0] & ~floating
+    if hanging.any():
+        edges = np.sort(half_edges(faces), axis=1)
+        _, edge, count = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_inverse=True, return_counts=True)
+        free = np.zeros(int(patch.max()) + 1, bool)
+        free[patch[(count == 1)[edge].reshape(-1, 3).any(axis=1)]] = True
+        hanging &= free[patch]
+    return floating | hanging, n_floating + len(np.unique(patch[hanging]))
+
+
+def _small(piece, areas):
+    """(m,) bool: faces of a piece (m,) that is small; and how many pieces are."""
+    total = np.bincount(piece, weights=areas)
+    small = (total > 0) & (total < CRUMB_SHARE * total.max())
+    return small[piece], int(small.sum())
 
 
 def inward_faces(vertices, faces, *, seed=0):

@@ -76,6 +76,15 @@ def test_crumbs_go_and_parts_stay():
     assert stats["crumbs"] == 2 and "2 floating crumbs" in scan.notes[0]
 
 
+def test_cards_that_hang_on_an_edge_go():
+    vertices, faces = ball()
+    a, b = faces[0, :2]
+    tip = 1.2 * vertices[[a, b]].mean(axis=0)
+    fin = [[a, b, len(vertices)], [b, len(vertices) + 1, len(vertices)]]
+    scan, stats = clean_scan(Scan(np.concatenate([vertices, [tip, 1.1 * tip]]), np.concatenate([faces, fin])))
+    assert np.array_equal(scan.faces, faces) and stats["crumbs"] == 1 and stats["closed"]
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_inside_out_and_mixed_winding(closed):
     vertices, faces = ball()
