@@ -105,8 +105,13 @@ def _along(chain):
 
 
 def _depths(ball, points, gap):
-    """(k,) shift along Z of the ball that brings each point to a gap: by bisection, as gaps grow when it recedes."""
-    near, far = np.full(len(points), 3 * ball.radius), np.full(len(points), -3 * ball.radius)
+    """(k,) shift along Z of the ball that brings each point to a gap before it: by bisection, as gaps grow when it
+    recedes from where its widest ring passes the point. Points farther aside than that ring tell nothing: of those
+    there are none if any lies nearer."""
+    aside = np.linalg.norm((points - ball.center)[:, :2], axis=1)
+    points = points[aside < ball.radius] if (aside < ball.radius).any() else points
+    near = points[:, 2] - ball.center[2]
+    far = near - 3 * ball.radius
     for _ in range(40):
         middle = 0.5 * (near + far)
         moved = points - np.stack([np.zeros_like(middle), np.zeros_like(middle), middle], axis=1)
