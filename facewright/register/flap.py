@@ -13,18 +13,22 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filt
 from facewright.mesh.sampling import sample_surface
 
 CELL_MM, DISK_MM, SMOOTH_MM = 2.0, 44.0, 4.0
+NEAR_MM = 20.0
+"""What stands out twice so far from the place in question counts for a seventh: a full cheek stands out too."""
 SAMPLES = 24000
 
 
-def standing_out(vertices, faces, center, reach_mm, least_mm):
-    """(n,) mm by which vertices (n, 3) stand out of the side of a head; 0 farther than reach_mm from center (3,), and
-    where they are not of the largest piece that stands out by least_mm.
+def standing_out(vertices, faces, near, center, least_mm):
+    """(k,) mm by which vertices near (k,) of (n, 3) stand out of the side of a head; 0 where they are not of the
+    largest piece of those, by volume and nearness to center, that stands out by least_mm.
 
-    faces (m, 3); the side is that of center: the head looks along z, its left along x
+    faces (m, 3); the side is that of center (3,), which they lie about: the head looks along z, its left along x
     """
-    side, heights = np.sign(center[0]), np.zeros(len(vertices))
+    side, heights = np.sign(center[0]), np.zeros(len(near))
     outwards = vertices * [side, 1.0, 1.0]
-    wide = reach_mm + DISK_MM
+    if not len(near):
+        return heights
+    wide = np.abs(vertices[near] - center).max() + DISK_MM
     about = (np.abs(outwards[:, 1:] - center[1:]) < wide).all(axis=1) & (outwards[:, 0] > 0.0)
     samples = sample_surface(outwards, faces, SAMPLES, about[faces].all(axis=1)).points
     if not len(samples):
@@ -40,13 +44,14 @@ def standing_out(vertices, faces, center, reach_mm, least_mm):
     nearest = distance_transform_edt(np.isinf(depth), return_distances=False, return_indices=True)
     depth = median_filter(depth[tuple(nearest)], 3)
     base = gaussian_filter(grey_opening(depth, footprint=_disk(0.5 * DISK_MM / CELL_MM)), SMOOTH_MM / CELL_MM)
-    near = np.flatnonzero(about & (np.linalg.norm(vertices - center, axis=1) < reach_mm))
-    inside = np.zeros((size, size), bool)
-    inside[cell(outwards[near])] = True
-    piece = binary_dilation(_largest(np.where(inside, depth - base - least_mm, 0.0)))
     at = cell(outwards[near])
-    heights[near] = np.where(piece[at], np.maximum(outwards[near, 0] - base[at], 0.0), 0.0)
-    return heights
+    inside = np.zeros((size, size), bool)
+    inside[at] = True
+    inside = binary_dilation(inside, iterations=2)  # a coarse scan has not a vertex in every cell
+    aside = (np.arange(size) + 0.5) * CELL_MM - 0.5 * size * CELL_MM
+    closeness = np.exp(-0.5 * (aside[:, None] ** 2 + aside**2) / NEAR_MM**2)
+    piece = binary_dilation(_largest(np.where(inside, depth - base - least_mm, 0.0), closeness))
+    return np.where(piece[at], np.maximum(outwards[near, 0] - base[at], 0.0), 0.0)
 
 
 def _disk(radius):
@@ -54,11 +59,11 @@ def _disk(radius):
     return x**2 + y**2 <= radius**2
 
 
-def _largest(above):
-    """(h, w) bool: of what hangs together and lies above 0, the piece of the largest volume."""
+def _largest(above, weight):
+    """(h, w) bool: of what hangs together and lies above 0, the piece of the largest volume; weight (h, w) of a cell's."""
     pieces, count = label(binary_dilation(above > 0.0))
     if not count:
         return np.zeros(above.shape, bool)
-    volume = np.bincount(pieces.ravel(), np.maximum(above, 0.0).ravel(), count + 1)
+    volume = np.bincount(pieces.ravel(), (weight * np.maximum(above, 0.0)).ravel(), count + 1)
     volume[0] = 0.0
     return pieces == volume.argmax()

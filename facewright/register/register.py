@@ -202,7 +202,7 @@ def _fit_model(template, basis, target, rules, pairs, closed, options, finely):
     mean = template.vertices
 
     def hidden(vertices):
-        return _hidden_ears(template, target, vertices)
+        return _hidden_ears(template, target, vertices, roughly=True)
 
     model = fit_model(mean, basis, expressions, *common, landmarks, options, hidden)
     seen = np.where(hidden(model.vertices), 0.0, trust)
@@ -218,12 +218,12 @@ def _with_ears(template, target, model):
     return replace(model, vertices=model.vertices + motion, rest=model.rest + motion)
 
 
-def _hidden_ears(template, target, vertices):
-    """(n,) bool: vertices (n, 3) of ears that the scan does not show."""
+def _hidden_ears(template, target, vertices, roughly=False):
+    """(n,) bool: vertices (n, 3) of ears that the scan does not show; roughly as hidden_ears takes it."""
     stop = template.skin.vertices[1]
     hidden = np.zeros(len(vertices), bool)
     faces = template.faces[template.skin.face_slice]
-    hidden[:stop] = hidden_ears(vertices[:stop], faces, _ears(template), target)
+    hidden[:stop] = hidden_ears(vertices[:stop], faces, _ears(template), target, roughly=roughly)
     return hidden
 
 
