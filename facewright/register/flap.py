@@ -60,7 +60,7 @@ def _disk(radius):
 
 
 def _largest(above, weight):
-    """(h, w) bool: of what hangs together and lies above 0, the piece of the largest volume; weight (h, w) of a cell's."""
+    """(h, w) bool: of what hangs together above 0, the piece of the largest volume, cells times weight (h, w)."""
     pieces, count = label(binary_dilation(above > 0.0))
     if not count:
         return np.zeros(above.shape, bool)

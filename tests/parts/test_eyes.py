@@ -70,6 +70,16 @@ def test_the_ball_sits_behind_the_lids_and_the_lids_on_it(hm08, hm08_person, see
     assert ball.gap(V[outer]).min() > -0.05
 
 
+@pytest.mark.parametrize("wider", [1.2, 1.4])
+def test_a_ball_stays_behind_lids_that_are_wider_than_itself(hm08, wider):
+    V = hm08.vertices.copy()
+    eye = hm08.regions["eyes"] & (V[:, 0] > 0.0)
+    middle = measure_eyeball(hm08, "left").center
+    V[eye, :2] = middle[:2] + wider * (V[eye, :2] - middle[:2])
+    ball = place_eyeball(hm08, V, hm08.lines, "left", 12.0)
+    assert np.linalg.norm(ball.center - middle) < 6.0
+
+
 def test_a_margin_is_never_moved_farther_than_allowed(hm08, hm08_person):
     face = hm08_person(1)
     ball = place_eyeball(hm08, face.vertices, face.lines, "left", 12.0)
