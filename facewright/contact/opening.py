@@ -40,7 +40,7 @@ _ROUNDS, _WORST = 10, 12  # of solving; poses that are asked more of a face in e
 _PATIENCE, _PATIENCE_OPEN = 4, 2  # rounds without gain, and once no face is folded
 _STILL_MM = 1e-4
 # What gives way no more readily than this, as margins of lids do, moves no farther, or is made that much stiffer.
-_STIFF_EASE, _STIFF_MM, _STIFFER = 0.1, 0.12, 0.4
+_STIFF_EASE, _STIFF_MM, _STIFFER = 0.1, 0.12, 0.2
 
 
 class Faces:
@@ -260,7 +260,8 @@ class _Opening:
         best = change = motion = np.zeros_like(self.patch.deltas)
         pairs, fewest, last, idle = np.zeros((0, 2), np.int64), None, None, 0
         for rounds_left in reversed(range(_ROUNDS)):
-            if self._strays(change):
+            strays = self._strays(change)
+            if strays:
                 # A gap between shut lids is seen, a face that stays folded at their corners is not.
                 self.root[:, self.stiff] *= _STIFFER
                 change = motion = np.zeros_like(change)
@@ -269,7 +270,7 @@ class _Opening:
             unsound = better and change.any() and self.around.unsound(change)
             if better and not unsound:
                 best, fewest, idle = change, faults, 0
-            else:
+            elif not strays:
                 idle += 1
             if unsound and self._watches_more(change):
                 lack, _ = self._lack(change)
