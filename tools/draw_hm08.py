@@ -13,8 +13,10 @@ from facewright.mesh.normals import face_areas
 from facewright.mesh.polygons import polygon_edges
 from facewright.mesh.raster import Camera, raster_uv
 from facewright.mesh.render import render, render_with_hits
+from facewright.rigging import in_place, rig_from_face, template_rig, unscanned_face
 from facewright.template.modifiers import read_modifiers, sample_identity
 from facewright.template.store import read_template
+from facewright.write.puppet import BACKGROUND, Puppet
 
 REGION_COLORS = {
     "scalp": (0.35, 0.38, 0.70),
@@ -52,6 +54,12 @@ def density_picture(template, size=1024):
     return (image * 255).astype(np.uint8)
 
 
+def bare_faces(template):
+    """(m, 3) faces of the skin and the eyeballs: lashes and what is clear would hide the lids."""
+    shown = [part for part in template.parts if part.name in ("skin", "eye_left", "eye_right")]
+    return np.concatenate([template.faces[part.face_slice] for part in shown])
+
+
 def painted(template):
     """(n, 3) linear colours: skin, and eyes with iris and pupil."""
     colors = np.tile(SKIN, (len(template.vertices), 1))
@@ -60,8 +68,6 @@ def painted(template):
             faces, uv_faces = (a[part.face_slice].ravel() for a in (template.faces, template.uv_faces))
             radius = np.linalg.norm(template.uv[uv_faces] - 0.5, axis=1)[:, None]
             colors[faces] = np.where(radius < 0.09, PUPIL, np.where(radius < 0.25, IRIS, SCLERA))
-        elif part.name != "skin":
-            colors[part.vertex_slice] = template.materials[part.material]["color"]
     return colors
 
 
@@ -72,13 +78,13 @@ def region_picture(template, yaw, pitch=0.0):
     colors[template.regions["skull"]] *= 0.6
     for line in template.lines.values():
         colors[line] = 0.0
-    return render(template.vertices, template.faces, Camera.looking_at(HEAD, yaw, pitch, 150, SIZE), colors=colors)
+    return render(template.vertices, bare_faces(template), Camera.looking_at(HEAD, yaw, pitch, 150, SIZE), colors=colors)
 
 
 def wire_picture(template, center, yaw, half_height):
     """The polygons' edges over clay, drawn where they are seen."""
     camera = Camera.looking_at(center, yaw, 0.0, half_height, SIZE)
-    image, hits = render_with_hits(template.vertices, template.faces, camera, colors=painted(template))
+    image, hits = render_with_hits(template.vertices, bare_faces(template), camera, colors=painted(template))
     depth = (1000.0 - hits.distance).reshape(SIZE)
     edges = polygon_edges(template.polygons)
     t = np.linspace(0.0, 1.0, 24)[:, None, None]
@@ -94,23 +100,24 @@ def wire_picture(template, center, yaw, half_height):
 
 
 def people_picture(template, count=8, seed=5):
-    """Random people of the modifiers, neutral."""
+    """Random people of the modifiers, neutral, as finished rigs."""
     modifiers, rng = read_modifiers("hm08"), np.random.default_rng(seed)
-    camera = Camera.looking_at(HEAD, 20, 0, 155, (320, 280))
-    colors = painted(template)
+    camera = Camera.looking_at(HEAD, 20, 0, 155, (480, 420))
     people = [template.vertices + sample_identity(modifiers, rng) for _ in range(count)]
-    return sheet([render(person, template.faces, camera, colors=colors) for person in people], count // 2)
+    rigs = [rig_from_face(in_place(unscanned_face(template, person))) for person in people]
+    return sheet([Puppet(rig).picture({}, camera) for rig in rigs], count // 2)
 
 
 def shapes_picture(template):
-    camera = Camera.looking_at((0.0, -35.0, 0.0), 0, 0, 85, (240, 200))
-    colors = painted(template)
-    moved = [template.vertices + delta for delta in template.deltas]
-    return sheet([render(vertices, template.faces, camera, colors=colors) for vertices in moved], 9)
+    """The template's finished rig in each of the 52 shapes; mouthClose as it is used, with the jaw open."""
+    camera = Camera.looking_at((0.0, -35.0, 0.0), 0, 0, 85, (280, 233))
+    puppet = Puppet(template_rig(template))
+    poses = [{name: 1.0} | ({"jawOpen": 1.0} if name == "mouthClose" else {}) for name in template.shape_names]
+    return sheet([puppet.picture(pose, camera) for pose in poses], 9)
 
 
 def sheet(images, columns):
-    blank = np.zeros_like(images[0])
+    blank = np.tile(np.round(255 * np.array(BACKGROUND)).astype(np.uint8), (*images[0].shape[:2], 1))
     images = images + [blank] * (-len(images) % columns)
     rows = [np.concatenate(images[i : i + columns], axis=1) for i in range(0, len(images), columns)]
     return np.concatenate(rows, axis=0)

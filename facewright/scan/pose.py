@@ -185,8 +185,8 @@ def _stand_up(scan, subject, to_search, options):
         if (sure := _confirmed(subject, looks, guess)) is not None:
             return sure[0], [] if sure[1] >= AGREED_WHOLLY else warnings
     raise InputError(
-        f"{scan.name}: no face was found on it; check that it is a head, or give the corners of both eyes and of the "
-        "mouth with --landmarks"
+        f"{scan.name}: no face was found on it; check that it is a head (of a whole body, cut the head out), or give "
+        "the corners of both eyes and of the mouth with --landmarks"
     )
 
 
