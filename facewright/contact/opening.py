@@ -40,7 +40,7 @@ _ROUNDS, _WORST = 10, 12  # of solving; poses that are asked more of a face in e
 _PATIENCE, _PATIENCE_OPEN = 4, 2  # rounds without gain, and once no face is folded
 _STILL_MM = 1e-4
 # What gives way no more readily than this, as margins of lids do, moves no farther, or is made that much stiffer.
-_STIFF_EASE, _STIFF_MM, _STIFFER = 0.1, 0.12, 0.2
+_STIFF_EASE, _STIFF_MM, _STIFFER = 0.1, 0.1, 0.2
 
 
 class Faces:
