@@ -78,7 +78,8 @@ def region_picture(template, yaw, pitch=0.0):
     colors[template.regions["skull"]] *= 0.6
     for line in template.lines.values():
         colors[line] = 0.0
-    return render(template.vertices, bare_faces(template), Camera.looking_at(HEAD, yaw, pitch, 150, SIZE), colors=colors)
+    camera = Camera.looking_at(HEAD, yaw, pitch, 150, SIZE)
+    return render(template.vertices, bare_faces(template), camera, colors=colors)
 
 
 def wire_picture(template, center, yaw, half_height):
