@@ -29,7 +29,7 @@ from facewright.register.pairs import (
 )
 from facewright.register.refine import refine_model
 from facewright.register.relief import lid_reliefs
-from facewright.register.skin import fit_skin, skin_rules, without_hair
+from facewright.register.skin import fit_skin, skin_rules, welts, without_hair
 from facewright.scan.pose import face_edge_mm
 
 # One slight smile is all the expression that is looked for on open-eyed rest faces: frowns, presses and brows, tried on
@@ -96,7 +96,12 @@ def register(scan, landmarks, template, options=None, placed=()):
     if not finely:
         surface, levels, hidden = smooth, LEVELS, np.any(_ears(template), axis=0)
     rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
-    skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, BALD * bald + levels)
+    levels = BALD * bald + levels
+    skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, levels)
+    hairline = welts(template, skin, faces, target.surface, rules.hairy)
+    if hairline.any():
+        rules = replace(rules, trust=np.where(hairline, 0.0, rules.trust))
+        skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, levels)
     skin = facing_the_scan(template, skin, faces, matches, "lips")
     fit = model.vertices.copy()
     fit[:stop] = without_knots(template, facing_the_scan(template, skin, faces, matches, "eyes"), faces)

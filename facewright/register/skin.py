@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from facewright.mesh.adjacency import dilate
 from facewright.mesh.closest import Surface, interpolate
+from facewright.mesh.facing import folded_faces
 from facewright.mesh.normals import normalized, vertex_normals
 from facewright.register.nonrigid import ElasticSkin, Rows
 
@@ -25,6 +26,8 @@ REGION_RULES = {
 HAIR_FROM_MM = 32.0
 # Rough surface there is not believed: hair and cloth scatter the normals this much more than the same scan's skin.
 SKIN_RATIO, HAIR_RATIO = 1.2, 1.5
+# So many folded faces are a hairline that the skin has climbed, and what lies so near is not believed.
+WELT_FACES, WELT_MM = 10, 12.0
 # A bald scalp is smoother than a face (0.4 of its roughness on a clean scan), a combed one as rough or rougher.
 BALD_RATIO = 0.75
 # The face is held to the model against data of one per mm2: bending and data leave it free to slide as a whole. Less so
@@ -111,6 +114,19 @@ def without_hair(rules, template, vertices, target):
         return replace(rules, trust=np.where(scalp, 0.0, rules.trust)), bald
     inward, outward = (np.where(scalp, np.inf, reach) for reach in (rules.inward, rules.outward))
     return replace(rules, inward=inward, outward=outward), bald
+
+
+def welts(template, skin, faces, surface, hairy):
+    """(n,) bool: hairy skin (n, 3) around faces of the face that a fit has folded: there it climbs a hairline.
+
+    Hair that is smooth, as in clay, is told from skin by nothing but its edge. faces (m, 3), surface the scan's
+    mesh.closest.Surface, hairy (n,) bool as in SkinRules
+    """
+    mask = hairy & template.regions["face"][: len(skin)]
+    folded = folded_faces(surface, skin, faces, mask[faces].all(axis=1))
+    if len(folded) < WELT_FACES:
+        return np.zeros(len(skin), bool)
+    return hairy & (cKDTree(skin[faces[folded]].mean(axis=1)).query(skin)[0] < WELT_MM)
 
 
 def line_rows(line, crease, weights, n):

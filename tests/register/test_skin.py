@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from facewright.mesh.closest import Surface
 from facewright.mesh.normals import vertex_normals
 from facewright.register.correspond import Samples, Target
 from facewright.register.lids import Border
 from facewright.register.register import LEVELS
-from facewright.register.skin import aside_rows, border_rows, fit_skin, skin_rules
+from facewright.register.skin import aside_rows, border_rows, fit_skin, skin_rules, welts
 
 
 def test_what_the_model_lacks_is_taken_up_along_the_normal(hm08):
@@ -66,3 +67,18 @@ def test_hair_before_a_cheek_is_told_by_its_colour_and_a_beard_is_not(hm08):
     assert (believed(rules.hairy, 5.0, 0.0) == 0).all()
     throat = rules.hairy & ~rules.curtained
     assert throat.any() and (believed(throat, 0.5, 1.0) == 1).all()
+
+
+def test_hairlines_that_the_skin_has_climbed_are_told_by_their_folds(hm08):
+    stop = hm08.skin.vertices[1]
+    V, F = hm08.vertices[:stop], hm08.faces[hm08.skin.face_slice]
+    hairy, surface = skin_rules(hm08).hairy, Surface(V, F)
+    assert not welts(hm08, V, F, surface, hairy).any()
+    center = V[hairy & hm08.regions["face"][:stop]].mean(axis=0) * [0.0, 1.0, 1.0]
+    center = V[np.linalg.norm(V - center, axis=1).argmin()]
+    turned = V.copy()
+    patch = np.linalg.norm(V - center, axis=1) < 6.0
+    turned[patch, 0] = 2 * center[0] - turned[patch, 0]
+    found = welts(hm08, turned, F, surface, hairy)
+    assert found[patch & hairy].all() and not (found & ~hairy).any()
+    assert np.linalg.norm(V[found] - center, axis=1).max() < 25.0
