@@ -110,9 +110,9 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
 
     scan a data.Scan in the fit's frame; fit (n, 3) fitted vertices of the Template
     returns dict folded, folded_lid_rims and folded_lip_rims (apart: a scan shows a bump or the other lid or lip where
-    the template has its thickness, so its normal there says nothing; none of all three where hair hides the face),
-    self_intersections (pairs with a face in region `face` that the neutral has not), lip_gap_mm (largest),
-    visible_mouth_mm2
+    the template has its thickness, so its normal there says nothing), folded_hidden (those of folded where hair hides
+    the face: there the hair's underside may lie next to it), self_intersections (pairs with a face in region `face`
+    that the neutral has not), lip_gap_mm (largest), visible_mouth_mm2
     """
     regions = template.regions if regions is None else regions
     lines = template.lines if lines is None else lines
@@ -120,8 +120,8 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
     in_face = region_faces(regions["face"], faces)
     skin = np.zeros(len(faces), bool)
     skin[template.skin.face_slice] = True
-    shown = ~touching(regions.get("hidden", np.zeros(len(fit), bool)), faces)  # under hair its underside is next
-    folded = folded_faces(Surface(scan.vertices, scan.faces), fit, faces, in_face & skin & shown)
+    folded = folded_faces(Surface(scan.vertices, scan.faces), fit, faces, in_face & skin)
+    hidden = touching(regions.get("hidden", np.zeros(len(fit), bool)), faces)
     lid_rim, lip_rim = _rims(template, fit, lines)
     gaps = lip_gaps_mm(fit, lines)
     middle = fit[lines["lip_seam_upper"]].mean(axis=0)
@@ -131,6 +131,7 @@ def measure_quality(scan, fit, template, regions=None, lines=None):
             inside[part.face_slice] = True
     return {
         "folded": int((~(lid_rim | lip_rim)[folded]).sum()),
+        "folded_hidden": int((hidden & ~(lid_rim | lip_rim))[folded].sum()),
         "folded_lid_rims": int(lid_rim[folded].sum()),
         "folded_lip_rims": int(lip_rim[folded].sum()),
         "self_intersections": len(new_self_intersections(fit, template.vertices, faces, skin, in_face)),

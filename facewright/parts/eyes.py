@@ -105,9 +105,11 @@ def _along(chain):
 
 
 def _depths(ball, points, gap):
-    """(k,) shift along Z of the ball that brings each point to a gap before it: by bisection, as gaps grow when it
-    recedes from where its widest ring passes the point. Points farther aside than that ring tell nothing: of those
-    there are none if any lies nearer."""
+    """(j,) shifts along Z of the ball that bring points (k, 3) to a gap before it, those j that it can touch if any.
+
+    By bisection, as gaps grow when the ball recedes from where its widest ring passes a point. A point farther aside
+    than that ring has no such place.
+    """
     aside = np.linalg.norm((points - ball.center)[:, :2], axis=1)
     points = points[aside < ball.radius] if (aside < ball.radius).any() else points
     near = points[:, 2] - ball.center[2]

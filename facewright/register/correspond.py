@@ -101,7 +101,9 @@ class Target:
         self.openness = np.ones(len(self.vertices)) if openness is None else np.asarray(openness)
 
     def tell_skin(self, skin_points, hair):
-        """Set self.hair (n,), and self.roughness (n,) relative to the skin: known to lie near skin_points (k, 3)."""
+        """Set self.roughness (n,) relative to the scan's skin, known to lie near skin_points (k, 3), and self.hair (n,)
+        as hair.hair_by_color gives it.
+        """
         degrees = roughness_deg(self.vertices, self.faces)
         skin = self.surface.closest(skin_points)
         typical = np.median(interpolate(degrees, self.faces, skin.faces, skin.barycentric))

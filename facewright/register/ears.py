@@ -159,8 +159,8 @@ class _Ear:
         there = standing_out(target.vertices, target.faces, near, center, low)[:: max(len(near) // options.points, 1)]
         shown = target.faces[np.isin(target.faces[:, 0], near)]
         area = lumped_mass(vertices, faces)[index], lumped_mass(target.vertices, shown)[self.near]
-        heights = self.height, there
-        self.own, self.there = (a * np.clip((h - low) / (high - low), 0.0, 1.0) for a, h in zip(area, heights))
+        heights = zip(area, (self.height, there))
+        self.own, self.there = (a * np.clip((h - low) / (high - low), 0.0, 1.0) for a, h in heights)
         self.outer = _outer(self.vertices, self.normals)
         self.own *= self.outer
         self.flap = cKDTree(target.vertices[self.near][self.there > 0.0])

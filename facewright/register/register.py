@@ -91,17 +91,7 @@ def register(scan, landmarks, template, options=None, placed=()):
     stop = template.skin.vertices[1]
     faces = template.faces[template.skin.face_slice]
     rules, bald = without_hair(rules, template, model.vertices, target)
-    hidden = _hidden_ears(template, target, model.vertices)[:stop]
-    surface, levels = target, LEVELS + DETAIL
-    if not finely:
-        surface, levels, hidden = smooth, LEVELS, np.any(_ears(template), axis=0)
-    rules = replace(rules, trust=np.where(hidden, 0.0, rules.trust))
-    levels = BALD * bald + levels
-    skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, levels)
-    hairline = welts(template, skin, faces, target.surface, rules.hairy)
-    if hairline.any():
-        rules = replace(rules, trust=np.where(hairline, 0.0, rules.trust))
-        skin, matches = fit_skin(model.vertices[:stop], faces, surface, rules, leading, levels)
+    skin, matches = _fit_skin(template, model, target, smooth, rules, leading, bald, finely)
     skin = facing_the_scan(template, skin, faces, matches, "lips")
     fit = model.vertices.copy()
     fit[:stop] = without_knots(template, facing_the_scan(template, skin, faces, matches, "eyes"), faces)
@@ -212,6 +202,25 @@ def _fit_model(template, basis, target, rules, pairs, closed, options, finely):
     model = fit_model(mean, basis, expressions, *common, landmarks, options, hidden)
     seen = np.where(hidden(model.vertices), 0.0, trust)
     return refine_model(model, mean, template.identity_basis, faces, seen, rules, target, finely), names
+
+
+def _fit_skin(template, model, target, smooth, rules, leading, bald, finely):
+    """The skin (n, 3) drawn from the ModelFit to the scan, or to its smooth Target where it has facets, and the last
+    Matches; not to what hides an ear, nor up a hairline.
+    """
+    stop = template.skin.vertices[1]
+    faces = template.faces[template.skin.face_slice]
+    surface, levels, hidden = smooth, LEVELS, np.any(_ears(template), axis=0)
+    if finely:
+        surface, levels, hidden = target, LEVELS + DETAIL, _hidden_ears(template, target, model.vertices)[:stop]
+
+    def fitted(left_out):
+        believed = replace(rules, trust=np.where(left_out, 0.0, rules.trust))
+        return fit_skin(model.vertices[:stop], faces, surface, believed, leading, BALD * bald + levels)
+
+    skin, matches = fitted(hidden)
+    hairline = welts(template, skin, faces, target.surface, rules.hairy)
+    return fitted(hidden | hairline) if hairline.any() else (skin, matches)
 
 
 def _with_ears(template, target, model):

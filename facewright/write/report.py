@@ -96,8 +96,9 @@ def warnings(scan, face, registration, clean_stats, pose_info):
             f"{registration['hidden_share']:.0%} of the face are hidden by hair or cloth, or missing: there "
             "it follows the model and is left out of the figures"
         )
-    if registration["folded"]:
-        notes.append(f"{registration['folded']} faces of the fit are folded")
+    folded = registration["folded"] - registration["folded_hidden"]
+    if folded:
+        notes.append(f"{folded} faces of the fit are folded")
     return notes
 
 

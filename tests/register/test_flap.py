@@ -1,6 +1,5 @@
 """What stands out as an ear does is told on any head, whatever lies around it."""
 
-import igl
 import numpy as np
 import pytest
 
@@ -9,12 +8,10 @@ from facewright.register.flap import standing_out
 CENTER = np.array([70.0, 0.0, 0.0])
 
 
-@pytest.fixture(scope="module")
-def ball():
-    vertices, faces = igl.icosahedron()
-    for _ in range(6):
-        vertices, faces = igl.loop(vertices, faces)
-    return 75.0 * vertices / np.linalg.norm(vertices, axis=1, keepdims=True), faces
+@pytest.fixture
+def ball(ball_scan):
+    scan = ball_scan(None, radius=75.0)
+    return scan.vertices, scan.faces
 
 
 def raised(vertices, center, size, by):
